@@ -1,0 +1,10 @@
+// Declares what each file of bindings adds to the module.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace mlrt {
+
+void bind_numerics(nanobind::module_ &m);
+
+} // namespace mlrt

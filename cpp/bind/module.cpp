@@ -1,0 +1,7 @@
+// The Python module of one instruction set: one function per file of bindings.
+#include "bind/bind.h"
+
+NB_MODULE(MLRT_MODULE, m) {
+    m.attr("isa") = MLRT_ISA_NAME;
+    mlrt::bind_numerics(m);
+}

@@ -1,0 +1,42 @@
+// The front door of the tracer: a group of rays in, hits or occlusion out.
+#pragma once
+
+#include "base/counters.h"
+#include "kdtree/tree.h"
+#include "traverse/ray_group.h"
+
+#include <cstdint>
+
+namespace mlrt {
+
+// How rays are taken through the tree (mlrta component names in brackets). All of them return
+// the same hits, bit for bit.
+enum class Traversal : uint32_t {
+    brute_force, // X0: every triangle, no tree
+    single,      // X1: one ray at a time
+    packet,      // X2: 16 rays at a time, an interval each
+    interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005, section 3.3)
+};
+
+enum class LeafRejection : uint32_t { none, parameters, slopes }; // step 2: off, mode P, mode S
+enum class Culling : uint32_t { inverse_frustum, frustum_planes };  // C1 + C2, or C3 as control
+
+struct TraceOptions {
+    Traversal traversal = Traversal::packet;
+    bool entry_points = true;       // MLRTA: search an entry point for each tile
+    uint32_t initial_tile = 128;    // ITS: rays along the side of a tile
+    uint32_t minimum_tile = 32;     // MTS: tiles of at most this size are traced
+    uint32_t split_factor = 4;      // SF: children of a tile that is split, 4 or 16
+    LeafRejection leaf_rejection = LeafRejection::slopes;
+    Culling culling = Culling::inverse_frustum;
+};
+
+// Nearest hits of all rays of the group.
+void trace_closest(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                   HitGroup hits, Counters &counters);
+
+// For each ray 1 if anything lies in its interval, else 0.
+void trace_any(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+               uint8_t *occluded, Counters &counters);
+
+} // namespace mlrt

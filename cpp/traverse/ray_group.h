@@ -1,0 +1,39 @@
+// Groups of rays that are traced together, and what comes back for each of them.
+#pragma once
+
+#include "base/vec.h"
+#include "geometry/triangle.h"
+
+#include <cstdint>
+
+namespace mlrt {
+
+// Rays {origin + t * direction, t_min < t <= t_max}, one array a component. Directions need not
+// have unit length; t is in units of the direction. A ray with t_max <= t_min is inactive: it
+// costs nothing and hits nothing. So is one with a component that is not finite or a direction
+// of zero length.
+//
+// Neighbours in the group should be neighbours in space: packets are runs of consecutive rays,
+// and a tile is split into runs of equal length. Pixels in Morton order have that property.
+//
+// Arrays are borrowed, hold `count` values and need no alignment or padding.
+struct RayGroup {
+    uint32_t count = 0;
+
+    // Either all rays start at common_origin and `origin` is not looked at, or each has its own.
+    bool has_common_origin = false;
+    Vec3f common_origin{};
+    const float *origin[3]{};
+
+    const float *direction[3]{};
+    const float *t_min = nullptr;
+    const float *t_max = nullptr;
+};
+
+// Nearest hits: t and the number of the triangle, or infinity and NO_PRIMITIVE.
+struct HitGroup {
+    float *t = nullptr;
+    uint32_t *primitive = nullptr;
+};
+
+} // namespace mlrt
