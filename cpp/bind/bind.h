@@ -5,6 +5,7 @@
 
 namespace mlrt {
 
+void bind_kdtree_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);
 
 } // namespace mlrt

@@ -3,5 +3,6 @@
 
 NB_MODULE(MLRT_MODULE, m) {
     m.attr("isa") = MLRT_ISA_NAME;
+    mlrt::bind_kdtree_selftest(m);
     mlrt::bind_numerics(m);
 }

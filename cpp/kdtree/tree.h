@@ -12,8 +12,13 @@
 namespace mlrt {
 
 // A tree over triangles. Node 0 is the root and its cell is `bounds`; a cell is closed, so
-// children share their split plane. A triangle is referenced by every leaf whose cell it touches,
-// except that one lying in a split plane is given to one side only.
+// children share their split plane.
+//
+// Every point of a referenced triangle lies in the cell of a leaf that references the triangle. A
+// triangle that touches a split plane from one side is not referenced on the other side for that,
+// and one lying in the plane is given to one side only. So a point in a split plane is found by
+// whoever visits all cells that contain it, those that are entered just where the best hit lies
+// included.
 struct KdTree {
     Box3f bounds;                      // of all referenced triangles; empty for an empty tree
     std::vector<KdNode> nodes;         // at least one: an empty tree is one empty leaf

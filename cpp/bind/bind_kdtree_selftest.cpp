@@ -1,0 +1,175 @@
+// What only the tests see of clipping and of the kd-tree's builder.
+#include "bind/bind.h"
+#include "geometry/clip.h"
+#include "geometry/cover.h"
+#include "geometry/degenerate.h"
+#include "kdtree/builder.h"
+#include "kdtree/sah.h"
+
+#include <cstring>
+#include <memory>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+using TriangleArray = nb::ndarray<const float, nb::ndim<3>, nb::shape<-1, 3, 3>,
+                                  nb::c_contig, nb::device::cpu>;
+using Point = std::array<float, 3>;
+
+Vec3f vec(const Point &p) {
+    return {p[0], p[1], p[2]};
+}
+Point point(Vec3f v) {
+    return {v.x, v.y, v.z};
+}
+
+std::vector<Triangle> triangles_of(const TriangleArray &array) {
+    std::vector<Triangle> triangles(array.shape(0));
+    if (!triangles.empty())
+        std::memcpy(triangles.data(), array.data(), triangles.size() * sizeof(Triangle));
+    return triangles;
+}
+
+Triangle triangle_of(const std::array<Point, 3> &t) {
+    return {vec(t[0]), vec(t[1]), vec(t[2])};
+}
+
+template <typename T>
+nb::object array_of(std::vector<T> values) {
+    using Owner = std::unique_ptr<std::vector<T>>;
+    std::vector<T> *kept =
+        Owner(std::make_unique<std::vector<T>>(std::move(values))).release();
+    nb::capsule owner(kept,
+                      [](void *p) noexcept { Owner(static_cast<std::vector<T> *>(p)); });
+    return nb::cast(
+        nb::ndarray<nb::numpy, T, nb::ndim<1>>(kept->data(), {kept->size()}, owner));
+}
+
+BuildOptions options_of(const nb::kwargs &kwargs) {
+    BuildOptions options;
+    for (auto [key, value] : kwargs) {
+        const std::string_view name = nb::cast<const char *>(key);
+        const auto set = [&](std::string_view field, auto &target) {
+            if (name != field)
+                return false;
+            target = nb::cast<std::remove_reference_t<decltype(target)>>(value);
+            return true;
+        };
+        if (!(set("traversal_cost", options.traversal_cost) ||
+              set("intersection_cost", options.intersection_cost) ||
+              set("empty_bonus", options.empty_bonus) || set("clip", options.clip) ||
+              set("rule_empty_cell", options.rule_empty_cell) ||
+              set("rule_flat_cell", options.rule_flat_cell) ||
+              set("rule_area_floor", options.rule_area_floor) ||
+              set("empty_cell_share", options.empty_cell_share) ||
+              set("area_floor", options.area_floor) || set("max_depth", options.max_depth)))
+            throw nb::type_error(("unknown build option " + std::string(name)).c_str());
+    }
+    return options;
+}
+
+nb::dict report_of(const BuildReport &r) {
+    nb::dict d;
+    d["inner_nodes"] = r.inner_nodes;
+    d["leaves"] = r.leaves;
+    d["empty_leaves"] = r.empty_leaves;
+    d["references"] = r.references;
+    d["max_leaf_count"] = r.max_leaf_count;
+    d["depth"] = r.depth;
+    d["empty_cell_splits"] = r.empty_cell_splits;
+    d["flat_cell_splits"] = r.flat_cell_splits;
+    d["area_floor_leaves"] = r.area_floor_leaves;
+    d["dropped_triangles"] = r.dropped_triangles;
+    d["sah_cost"] = r.sah_cost;
+    d["seconds"] = r.seconds;
+    return d;
+}
+
+nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
+    std::vector<Triangle> triangles = triangles_of(array);
+    const BuildOptions options = options_of(kwargs);
+    BuiltTree built;
+    {
+        nb::gil_scoped_release release;
+        built = build_kd_tree(std::move(triangles), options);
+    }
+    const KdTree &tree = built.tree;
+    const size_t n = tree.nodes.size();
+    std::vector<uint32_t> axis(n), child(n), first(n), count(n);
+    std::vector<float> split(n);
+    for (size_t i = 0; i < n; ++i) {
+        const KdNode node = tree.nodes[i];
+        if (node.is_leaf()) {
+            axis[i] = KdNode::LEAF;
+            first[i] = node.first_reference();
+            count[i] = node.reference_count();
+        } else {
+            axis[i] = uint32_t(node.axis());
+            split[i] = node.split();
+            child[i] = node.lower_child();
+        }
+    }
+    nb::dict d;
+    d["axis"] = array_of(std::move(axis));
+    d["split"] = array_of(std::move(split));
+    d["child"] = array_of(std::move(child));
+    d["first_reference"] = array_of(std::move(first));
+    d["count"] = array_of(std::move(count));
+    d["references"] = array_of(std::vector<uint32_t>(tree.references));
+    d["lo"] = point(tree.bounds.lo);
+    d["hi"] = point(tree.bounds.hi);
+    d["depth"] = tree.depth;
+    d["report"] = report_of(built.report);
+    return d;
+}
+
+std::optional<std::pair<Point, Point>> clip(const std::array<Point, 3> &triangle,
+                                            const Point &lo, const Point &hi) {
+    const Box3f bounds = clip_triangle(triangle_of(triangle), {vec(lo), vec(hi)});
+    if (bounds.empty())
+        return std::nullopt;
+    return std::pair{point(bounds.lo), point(bounds.hi)};
+}
+
+double split_cost(const Point &lo, const Point &hi, int axis, float position,
+                  uint64_t lower_count, uint64_t upper_count, const nb::kwargs &kwargs) {
+    return SplitCost(options_of(kwargs), {vec(lo), vec(hi)}, axis)(position, lower_count,
+                                                                   upper_count);
+}
+
+double uncovered(const std::array<double, 4> &rectangle,
+                 const std::vector<std::array<std::array<double, 2>, 3>> &triangles) {
+    std::vector<Triangle2> flat;
+    for (const auto &t : triangles)
+        flat.push_back({{{t[0][0], t[0][1]}, {t[1][0], t[1][1]}, {t[2][0], t[2][1]}}});
+    return uncovered_area({{rectangle[0], rectangle[1]}, {rectangle[2], rectangle[3]}},
+                          flat, std::numeric_limits<double>::infinity());
+}
+
+} // namespace
+
+void bind_kdtree_selftest(nb::module_ &m) {
+    nb::module_ s = m.def_submodule("kdtree_selftest");
+    s.def("build", &build, nb::arg("triangles"), nb::arg("options"));
+    s.def("clip_triangle", &clip);
+    s.def("is_degenerate",
+          [](const std::array<Point, 3> &t) { return is_degenerate(triangle_of(t)); });
+    s.def("split_cost", &split_cost, nb::arg("lo"), nb::arg("hi"), nb::arg("axis"),
+          nb::arg("position"), nb::arg("lower_count"), nb::arg("upper_count"),
+          nb::arg("options"));
+    s.def("uncovered_area", &uncovered);
+    s.attr("max_tree_depth") = MAX_TREE_DEPTH;
+}
+
+} // namespace mlrt
