@@ -1,0 +1,61 @@
+// TraceOptions and Counters as Python dicts.
+#pragma once
+
+#include "base/counters.h"
+#include "bind/fields.h"
+#include "mlrta/trace.h"
+
+namespace mlrt {
+
+// Fields that are missing keep their default. Raises ValueError for an unknown one or a bad
+// value.
+inline TraceOptions trace_options_from(nanobind::handle dict) {
+    Fields fields(dict, "options");
+    TraceOptions options;
+    options.traversal = fields.choice<Traversal>("traversal",
+                                                 {{"brute_force", Traversal::brute_force},
+                                                  {"single", Traversal::single},
+                                                  {"packet", Traversal::packet},
+                                                  {"interval", Traversal::interval}},
+                                                 options.traversal);
+    options.entry_points = fields.boolean("entry_points", options.entry_points);
+    options.initial_tile = fields.integer_or("initial_tile", options.initial_tile, 1024);
+    options.minimum_tile = fields.integer_or("minimum_tile", options.minimum_tile, 1024);
+    options.split_factor = fields.integer_or("split_factor", options.split_factor, 16);
+    options.leaf_rejection =
+        fields.choice<LeafRejection>("leaf_rejection",
+                                     {{"none", LeafRejection::none},
+                                      {"parameters", LeafRejection::parameters},
+                                      {"slopes", LeafRejection::slopes}},
+                                     options.leaf_rejection);
+    options.culling = fields.choice<Culling>("culling",
+                                             {{"inverse_frustum", Culling::inverse_frustum},
+                                              {"frustum_planes", Culling::frustum_planes}},
+                                             options.culling);
+    fields.finish();
+    if (options.initial_tile == 0 || options.minimum_tile == 0)
+        refuse_value(
+            "options['initial_tile'] and options['minimum_tile'] must be positive.");
+    if (options.minimum_tile > options.initial_tile)
+        refuse_value("options['minimum_tile'] must not exceed options['initial_tile'].");
+    if (options.split_factor != 4 && options.split_factor != 16)
+        refuse_value("options['split_factor'] must be 4 or 16.");
+    return options;
+}
+
+inline nanobind::dict counters_to_dict(const Counters &counters) {
+    nanobind::dict dict;
+    dict["rays"] = counters.rays;
+    dict["packets"] = counters.packets;
+    dict["entry_steps"] = counters.entry_steps;
+    dict["traversal_steps"] = counters.traversal_steps;
+    dict["leaf_visits"] = counters.leaf_visits;
+    dict["triangle_tests"] = counters.triangle_tests;
+    dict["double_tests"] = counters.double_tests;
+    dict["exact_tests"] = counters.exact_tests;
+    dict["tiles"] = counters.tiles;
+    dict["missed_tiles"] = counters.missed_tiles;
+    return dict;
+}
+
+} // namespace mlrt

@@ -1,0 +1,38 @@
+// A choice among finitely many things with given weights.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace mlrt {
+
+// As Mitsuba's DiscreteDistribution, so that equal random numbers choose equal things.
+class Distribution {
+public:
+    struct Choice {
+        uint32_t index;
+        float reused; // the random number made uniform again
+        float probability;
+    };
+
+    Distribution() = default;
+    explicit Distribution(std::span<const float> weights);
+
+    bool empty() const { return cumulative_.empty(); }
+
+    // 1 / sum of the weights; 0 if there is no weight at all.
+    float normalization() const { return normalization_; }
+
+    // Needs a positive sum of weights. `random` is in [0, 1).
+    Choice choose(float random) const;
+
+private:
+    std::vector<float> weights_;
+    std::vector<float> cumulative_;
+    uint32_t first_ = 0, last_ = 0; // the outermost entries with a positive weight
+    float sum_ = 0;
+    float normalization_ = 0;
+};
+
+} // namespace mlrt

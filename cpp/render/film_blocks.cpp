@@ -1,0 +1,95 @@
+#include "render/film_blocks.h"
+
+#include "base/check.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+uint32_t divide_up(uint32_t a, uint32_t b) {
+    return (a + b - 1) / b;
+}
+
+} // namespace
+
+FilmBlocks::FilmBlocks(const Film &film, uint32_t channel_count)
+    : film_(film), filter_(film), sampled_(sampled_pixels(film, filter_)),
+      channel_count_(channel_count), blocks_across_(divide_up(sampled_.width, BLOCK_SIZE)),
+      blocks_down_(divide_up(sampled_.height, BLOCK_SIZE)),
+      stride_(BLOCK_SIZE + 2 * uint32_t(filter_.reach())) {
+    sums_.resize(size_t(blocks_across_) * blocks_down_ * stride_ * stride_ *
+                 (channel_count_ + 1));
+}
+
+void FilmBlocks::add(uint32_t column, uint32_t row, float x, float y, const float *values) {
+    MLRT_CHECK(column < sampled_.width && row < sampled_.height);
+    const uint32_t block = row / BLOCK_SIZE * blocks_across_ + column / BLOCK_SIZE;
+    const uint32_t inner_column = column % BLOCK_SIZE, inner_row = row % BLOCK_SIZE;
+    const size_t entry = channel_count_ + 1;
+    // The buffer begins `reach` pixels before the block: this is the footprint's first
+    // entry.
+    float *first = sums_.data() +
+                   ((size_t(block) * stride_ + inner_row) * stride_ + inner_column) * entry;
+    if (filter_.is_box()) {
+        first[0] += 1;
+        for (uint32_t k = 0; k < channel_count_; ++k)
+            first[1 + k] += values[k];
+        return;
+    }
+
+    constexpr int MAX_TAPS = 64;
+    const int taps = 2 * filter_.reach() + 1;
+    MLRT_CHECK(taps <= MAX_TAPS);
+    const float left = float(sampled_.x + int(column) - filter_.reach()) + 0.5f - x;
+    const float top = float(sampled_.y + int(row) - filter_.reach()) + 0.5f - y;
+    float weights_x[MAX_TAPS], weights_y[MAX_TAPS];
+    for (int i = 0; i < taps; ++i) {
+        weights_x[i] = filter_.weight(left + float(i));
+        weights_y[i] = filter_.weight(top + float(i));
+    }
+    for (int j = 0; j < taps; ++j) {
+        float *out = first + size_t(j) * stride_ * entry;
+        for (int i = 0; i < taps; ++i, out += entry) {
+            const float weight = weights_x[i] * weights_y[j];
+            out[0] += weight;
+            for (uint32_t k = 0; k < channel_count_; ++k)
+                out[1 + k] = std::fma(values[k], weight, out[1 + k]);
+        }
+    }
+}
+
+const float *FilmBlocks::at(uint32_t block, int column, int row) const {
+    return sums_.data() +
+           ((size_t(block) * stride_ + uint32_t(row)) * stride_ + uint32_t(column)) *
+               (channel_count_ + 1);
+}
+
+float FilmBlocks::pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const {
+    const int reach = filter_.reach();
+    const int column = int(film_.crop_x + crop_column) - sampled_.x;
+    const int row = int(film_.crop_y + crop_row) - sampled_.y;
+    const int size = int(BLOCK_SIZE);
+    // Blocks whose pixels lie within reach of this one.
+    const int first_across = std::max(column - reach, 0) / size;
+    const int last_across = std::min((column + reach) / size, int(blocks_across_) - 1);
+    const int first_down = std::max(row - reach, 0) / size;
+    const int last_down = std::min((row + reach) / size, int(blocks_down_) - 1);
+
+    float weight = 0;
+    std::fill_n(sums, channel_count_, 0.0f);
+    for (int down = first_down; down <= last_down; ++down) {
+        for (int across = first_across; across <= last_across; ++across) {
+            const float *in = at(uint32_t(down) * blocks_across_ + uint32_t(across),
+                                 column - across * size + reach, row - down * size + reach);
+            weight += in[0];
+            for (uint32_t k = 0; k < channel_count_; ++k)
+                sums[k] += in[1 + k];
+        }
+    }
+    return weight;
+}
+
+} // namespace mlrt

@@ -1,0 +1,44 @@
+// Weighted sums of samples, accumulated in an order that nothing but the film decides.
+#pragma once
+
+#include "render/filter.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace mlrt {
+
+// The sampled rectangle is cut into square blocks of a fixed size. The samples of a block's
+// pixels are added to a buffer of its own, which is wider by the reach of the filter; at
+// the end the buffers that overlap at a pixel are added in the order of the blocks. Whoever
+// adds the samples of one block in a fixed order therefore gets the same picture from any
+// number of threads.
+class FilmBlocks {
+public:
+    static constexpr uint32_t BLOCK_SIZE = 32; // chosen: 32 x 32 x 4 floats are 16 KiB
+
+    FilmBlocks(const Film &film, uint32_t channel_count);
+
+    const PixelRect &sampled() const { return sampled_; }
+    uint32_t channel_count() const { return channel_count_; }
+
+    // Adds a sample at a film position (x, y) inside the pixel (column, row) of the sampled
+    // rectangle. Calls for pixels of one block must not overlap in time.
+    void add(uint32_t column, uint32_t row, float x, float y, const float *values);
+
+    // Sum of weight * value of one pixel of the crop, for each channel, and of the weights.
+    float pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const;
+
+private:
+    const float *at(uint32_t block, int column, int row) const;
+
+    Film film_;
+    ReconstructionFilter filter_;
+    PixelRect sampled_;
+    uint32_t channel_count_;
+    uint32_t blocks_across_ = 0, blocks_down_ = 0;
+    uint32_t stride_ = 0;     // pixels along the side of a block's buffer
+    std::vector<float> sums_; // block, row, column, then the weight and the channels
+};
+
+} // namespace mlrt

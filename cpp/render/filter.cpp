@@ -1,0 +1,59 @@
+#include "render/filter.h"
+
+#include "render/shadow_offset.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+// Minimax fit to exp(-x / 2) on [0, 16], lowest power first, which Mitsuba 3.9 uses on
+// processors without a fast exponential (gaussian.cpp). It deviates from the exponential by
+// up to 7e-4, so a picture can only be equal with the same one.
+constexpr std::array<double, 10> GAUSSIAN_FIT{
+    9.992604880e-1,  -4.977025247e-1, 1.222248550e-1,  -1.932406282e-2, 2.136713061e-3,
+    -1.679873860e-4, 9.202145248e-6,  -3.329417433e-7, 7.128382794e-9,  -6.821193280e-11};
+
+} // namespace
+
+ReconstructionFilter::ReconstructionFilter(const Film &film)
+    : box_(film.filter == FilterType::box), radius_(box_ ? 0.5f : film.filter_radius) {
+    if (box_)
+        return;
+    reach_ = int(std::ceil(radius_ - 0.5f));
+    border_ = std::max(0, int(std::ceil(radius_ - 0.5f - 2 * RAY_EPSILON)));
+    const double variance = double(film.filter_stddev) * film.filter_stddev;
+    double scale = 1;
+    for (int i = 0; i < 10; ++i) {
+        coefficients_[i] = float(GAUSSIAN_FIT[i] * scale);
+        scale /= variance;
+    }
+    coefficients_[0] -= polynomial(radius_ * radius_);
+}
+
+// Estrin's scheme with fused operations, term by term as Dr.Jit evaluates it: the terms
+// cancel, so another order would show.
+float ReconstructionFilter::polynomial(float x) const {
+    const auto &c = coefficients_;
+    const float x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
+    const float c01 = std::fma(x, c[1], c[0]), c23 = std::fma(x, c[3], c[2]);
+    const float c45 = std::fma(x, c[5], c[4]), c67 = std::fma(x, c[7], c[6]);
+    const float c89 = std::fma(x, c[9], c[8]);
+    const float c03 = std::fma(x2, c23, c01), c47 = std::fma(x2, c67, c45);
+    return std::fma(x8, c89, std::fma(x4, c47, c03));
+}
+
+float ReconstructionFilter::weight(float x) const {
+    return std::max(polynomial(x * x), 0.0f);
+}
+
+PixelRect sampled_pixels(const Film &film, const ReconstructionFilter &filter) {
+    const int border = film.sample_border ? filter.border() : 0;
+    return {int(film.crop_x) - border, int(film.crop_y) - border,
+            film.crop_width + 2 * uint32_t(border),
+            film.crop_height + 2 * uint32_t(border)};
+}
+
+} // namespace mlrt
