@@ -1,0 +1,128 @@
+"""The elements of a scene as a tree of names and properties, loaded or not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import mitsuba as mi
+
+from . import mitsuba_objects as objects
+
+
+@dataclass
+class Element:
+    """One plugin of the scene: ``kind`` is Mitsuba's type of object in lower case."""
+
+    kind: str
+    plugin: str
+    id: str = ""
+    where: str = ""
+    properties: dict[str, Any] = field(default_factory=dict)
+    children: list[tuple[str, Element]] = field(default_factory=list)
+
+    def children_of(self, kind: str) -> Iterator[Element]:
+        return (child for _, child in self.children if child.kind == kind)
+
+    def walk(self) -> Iterator[Element]:
+        """This element and all that it holds, each once for each place where it is used."""
+        yield self
+        for _, child in self.children:
+            yield from child.walk()
+
+    def __str__(self) -> str:
+        name = f"{self.kind} '{self.plugin}'"
+        if self.id:
+            name += f" with id '{self.id}'"
+        return f"{name} at {self.where}" if self.where else name
+
+
+KINDS = {
+    "Scene": "scene",
+    "Sensor": "sensor",
+    "Film": "film",
+    "ReconstructionFilter": "rfilter",
+    "Sampler": "sampler",
+    "Integrator": "integrator",
+    "Emitter": "emitter",
+    "Shape": "shape",
+    "BSDF": "bsdf",
+    "Texture": "texture",
+    "Volume": "volume",
+    "Medium": "medium",
+    "PhaseFunction": "phase function",
+}
+
+
+def kind_of(instance: Any) -> str:
+    """The kind of a loaded object."""
+    module = objects.variant_module(instance)
+    for name, kind in KINDS.items():
+        base = getattr(module, name, None)
+        if base is not None and isinstance(instance, base):
+            return kind
+    return "object"
+
+
+def from_state(state: Any) -> list[Element]:
+    """The element of each node of a parsed scene; the first is the scene itself."""
+    elements = []
+    for node in state.nodes:
+        location = mi.parser.file_location(state, node) if state.files else ""
+        elements.append(
+            Element(
+                kind=KINDS.get(node.type.name, node.type.name.lower()),
+                plugin=node.props.plugin_name(),
+                id=node.props.id(),
+                where=location.replace(" (line ", " line ")
+                .replace(", col ", ":")
+                .rstrip(")"),
+            )
+        )
+    for node, element in zip(state.nodes, elements, strict=True):
+        for name in node.props.keys():  # noqa: SIM118 (Properties is no mapping)
+            type_name = node.props.type(name).name
+            if type_name == "ResolvedReference":
+                element.children.append((name, elements[node.props[name].index()]))
+            elif type_name == "Object":
+                element.children.append((name, from_object(node.props[name], name)))
+            else:
+                element.properties[name] = node.props[name]
+    return elements
+
+
+def from_object(instance: Any, fallback_id: str = "") -> Element:
+    """The element of a loaded object with what it shows of its insides."""
+    kind = kind_of(instance)
+    element = Element(kind, objects.plugin_name(instance), instance.id() or fallback_id)
+    if kind == "shape":
+        nested = {"bsdf": instance.bsdf(), "emitter": instance.emitter()}
+        nested["interior"] = instance.interior_medium()
+        nested["exterior"] = instance.exterior_medium()
+    elif kind == "sensor":
+        nested = {"film": instance.film(), "sampler": instance.sampler()}
+    elif kind == "film":
+        nested = {"rfilter": instance.rfilter()}
+    elif kind in ("bsdf", "emitter"):
+        nested = {k: v for k, v in objects.members(instance).items()}
+    else:
+        nested = {}
+    for name, child in nested.items():
+        if isinstance(child, mi.Object):
+            element.children.append((name, from_object(child, name)))
+    return element
+
+
+def from_scene(scene: Any) -> Element:
+    """The element of a loaded scene."""
+    root = Element("scene", "scene", scene.id())
+    emitters_of_shapes = [shape.emitter() for shape in scene.shapes()]
+    for instance in [
+        *scene.sensors(),
+        *scene.shapes(),
+        *(e for e in scene.emitters() if not any(e is s for s in emitters_of_shapes)),
+        *([scene.integrator()] if scene.integrator() is not None else []),
+    ]:
+        root.children.append((instance.id(), from_object(instance)))
+    return root

@@ -1,0 +1,40 @@
+"""Errors and warnings of the package; each message is one sentence."""
+
+from __future__ import annotations
+
+import re
+
+
+class MlrtError(ValueError):
+    """Something that the caller gave cannot be used."""
+
+
+class SceneError(MlrtError):
+    """A scene, or a file that belongs to it, is missing, malformed or makes no sense."""
+
+
+class UnsupportedFeature(SceneError):
+    """The scene uses a plugin or a parameter that cannot be rendered natively."""
+
+
+class OutputError(MlrtError):
+    """An image cannot be written where it is wanted."""
+
+
+class MlrtWarning(UserWarning):
+    """Something in the scene is approximated or ignored; the message names it."""
+
+
+def one_sentence(message: str) -> str:
+    """Mitsuba's report of an exception as a single line.
+
+    Drops what only its developers need (source locations, classes, terminal colours).
+    """
+    message = re.sub(r"\x1b\[[0-9;]*m", "", message)
+    message = re.sub(r"\[[\w.]+\.(?:cpp|h):\d+\]\s*", "", message)
+    message = re.sub(r"\[[A-Z]\w+\] ", "", message)
+    message = re.sub(
+        r'failed to instantiate (\w+) plugin of type "(\w+)": ', r"\1 '\2': ", message
+    )
+    message = " ".join(message.split())
+    return message.rstrip("!. ")

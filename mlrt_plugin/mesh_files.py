@@ -1,0 +1,79 @@
+"""A check of mesh files that Mitsuba does not make: it trusts the indices in PLY and
+serialized files, and crashes on a face that refers to a vertex that does not exist.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from .errors import SceneError
+from .ply_indices import triangle_indices
+
+SERIALIZED_MAGIC = 0x041C
+SERIALIZED_NORMALS = 0x0001
+SERIALIZED_TEXCOORDS = 0x0002
+SERIALIZED_COLORS = 0x0008
+SERIALIZED_DOUBLE = 0x2000
+
+
+def check_mesh_file(path: Path, plugin: str, shape_index: int = 0) -> None:
+    """Raises SceneError if a face of the file refers to a vertex that does not exist.
+
+    Any other defect is left for Mitsuba to report, which reads the file with all its
+    contents.
+    """
+    try:
+        if plugin == "ply":
+            indices, vertex_count = triangle_indices(path)
+        elif plugin == "serialized":
+            indices, vertex_count = serialized_indices(path, shape_index)
+        else:
+            return
+    except (OSError, ValueError, LookupError, StopIteration, struct.error, zlib.error):
+        return
+    bad = indices[(indices < 0) | (indices >= vertex_count)]
+    if bad.size:
+        raise SceneError(
+            f"mesh file '{path}' has a face that refers to vertex {bad.flat[0]} of "
+            f"{vertex_count}: "
+            "repair the mesh or export it anew"
+        )
+
+
+def serialized_indices(path: Path, shape_index: int) -> tuple[npt.NDArray[np.int64], int]:
+    """Indices (F, 3) of a mesh in a file of Mitsuba's own format, and its number of
+    vertices.
+
+    The layout is documented with Mitsuba's `serialized` plugin: a file ends in the offsets
+    of its meshes and their number, and a mesh is a version followed by a compressed stream.
+    """
+    data = path.read_bytes()
+    magic, version = struct.unpack_from("<HH", data)
+    if magic != SERIALIZED_MAGIC:
+        raise ValueError("not a serialized mesh")
+    (count,) = struct.unpack_from("<I", data, len(data) - 4)
+    offset_type = "<Q" if version >= 4 else "<I"
+    width = struct.calcsize(offset_type)
+    (offset,) = struct.unpack_from(
+        offset_type, data, len(data) - 4 - width * (count - shape_index)
+    )
+    body = zlib.decompressobj().decompress(data[offset + 4 :])
+    (flags,) = struct.unpack_from("<I", body)
+    position = 4
+    if version >= 4:
+        position = body.index(b"\0", position) + 1
+    vertex_count, face_count = struct.unpack_from("<QQ", body, position)
+    numbers = 3
+    numbers += 3 if flags & SERIALIZED_NORMALS else 0
+    numbers += 2 if flags & SERIALIZED_TEXCOORDS else 0
+    numbers += 3 if flags & SERIALIZED_COLORS else 0
+    real = 8 if flags & SERIALIZED_DOUBLE else 4
+    start = position + 16 + vertex_count * numbers * real
+    index = np.dtype("<u8" if vertex_count > 0xFFFFFFFF else "<u4")
+    indices = np.frombuffer(body, index, 3 * face_count, start)
+    return indices.astype(np.int64).reshape(-1, 3), vertex_count

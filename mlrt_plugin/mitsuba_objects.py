@@ -1,0 +1,128 @@
+"""Looking into loaded Mitsuba objects of any variant, whichever variant is set at the
+moment."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+import numpy.typing as npt
+
+from .errors import UnsupportedFeature
+from .scene_arrays import Vec3
+
+PLUGIN_OF_CLASS = {
+    "OBJMesh": "obj",
+    "PLYMesh": "ply",
+    "SerializedMesh": "serialized",
+    "Rectangle": "rectangle",
+    "Cube": "cube",
+    "Mesh": "mesh",
+    "SmoothDiffuse": "diffuse",
+    "TwoSidedBRDF": "twosided",
+    "PointLight": "point",
+    "SpotLight": "spot",
+    "DirectionalEmitter": "directional",
+    "AreaLight": "area",
+    "ConstantBackgroundEmitter": "constant",
+    "EnvironmentMapEmitter": "envmap",
+    "PerspectiveCamera": "perspective",
+    "HDRFilm": "hdrfilm",
+    "BoxFilter": "box",
+    "GaussianFilter": "gaussian",
+    "IndependentSampler": "independent",
+    "DirectIntegrator": "direct",
+    "PathIntegrator": "path",
+    "DepthIntegrator": "depth",
+    "AOVIntegrator": "aov",
+    "UniformSpectrum": "uniform",
+    "SRGBReflectanceSpectrum": "srgb",
+}
+"""Plugin names of the classes of Mitsuba that scenes commonly use; others go by their
+class."""
+
+
+def plugin_name(instance: Any) -> str:
+    """Name under which the plugin of a loaded object is written in a scene file."""
+    name = str(instance.class_name())
+    return PLUGIN_OF_CLASS.get(name, name)
+
+
+def variant_module(instance: Any) -> Any:
+    """The Mitsuba module of the variant that an object was loaded in."""
+    return getattr(mi, instance.variant_name())
+
+
+_listeners: dict[str, Any] = {}
+
+
+def _listener(module: Any, variant: str) -> Any:
+    """A traversal callback class of the variant: it must derive from that variant's own."""
+    if variant not in _listeners:
+
+        class Listener(module.TraversalCallback):  # type: ignore[misc]
+            def __init__(self) -> None:
+                super().__init__()
+                self.found: dict[str, tuple[Any, Any]] = {}
+
+            def put(self, name: str, value: Any, flags: Any, cpptype: Any = None) -> None:
+                self.found[name] = (value, cpptype)
+
+        _listeners[variant] = Listener
+    return _listeners[variant]
+
+
+def members(instance: Any) -> dict[str, Any]:
+    """Parameters and nested objects that an object shows to ``mi.traverse``, by name."""
+    module = variant_module(instance)
+    listener = _listener(module, instance.variant_name())()
+    instance.traverse(listener)
+    return {
+        name: value
+        if isinstance(value, mi.Object)
+        else module.get_property(value, cpptype, instance)
+        for name, (value, cpptype) in listener.found.items()
+    }
+
+
+def described(instance: Any, name: str, default: str = "") -> str:
+    """A parameter that only the printed description of an object tells."""
+    match = re.search(rf"\b{name} = ([^\s,\]]+)", str(instance))
+    return match.group(1) if match else default
+
+
+def number(value: Any) -> float:
+    """A scalar, or the only entry of a Dr.Jit array."""
+    return float(np.asarray(value, dtype=np.float64).reshape(-1)[0])
+
+
+def vec3(value: Any) -> Vec3:
+    """Three numbers from anything that holds three."""
+    x, y, z = (float(c) for c in np.asarray(value, dtype=np.float64).reshape(3))
+    return x, y, z
+
+
+def matrix(transform: Any) -> npt.NDArray[np.float64]:
+    """The (4, 4) float64 matrix of a transformation."""
+    return np.asarray(np.array(transform.matrix), dtype=np.float64).reshape(4, 4)
+
+
+def color(spectrum: Any, owner: str) -> Vec3:
+    """Linear RGB of a spectrum that is the same everywhere.
+
+    Raises UnsupportedFeature if it varies in space or is not one that an RGB variant
+    stores as a colour; ``owner`` says in the message what the spectrum belongs to.
+    """
+    plugin = plugin_name(spectrum)
+    if plugin == "uniform":
+        value = number(members(spectrum)["value"])
+        return value, value, value
+    if plugin == "srgb":
+        return vec3(members(spectrum)["value"])
+    raise UnsupportedFeature(
+        f"{owner} has a '{plugin}' texture, and only constant colours are supported so "
+        "far: "
+        "replace it by an <rgb> value"
+    )

@@ -1,0 +1,213 @@
+"""Mitsuba's parser, driven so that nothing of the caller's session changes.
+
+A scene is read in the variant ``scalar_rgb``, which needs no LLVM, through variant-free
+entry points: the variant that the caller has set, if any, stays set.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import mitsuba as mi
+
+from .elements import Element, from_state
+from .errors import SceneError, one_sentence
+
+READING_VARIANT = "scalar_rgb"
+
+mitsuba: Any = mi
+"""For what Mitsuba's type stubs leave out."""
+
+REMEDIES = (
+    ("unused parameter", "remove the -D that the scene does not use, or mend its name"),
+    ("undefined parameter", "give it a value by -D or by a <default> in the scene"),
+    ("unreferenced propert", "remove the property or mend its name"),
+    ("unresolved reference", "mend the reference"),
+    ("file not found", "check the path of the file, which is relative to the scene"),
+    ("Could not map", "check that the file is not empty and can be read"),
+    (
+        "Storing new normals",
+        "the mesh file has no faces and may be truncated, export it anew",
+    ),
+    ("invalid vertex position", "the mesh has NaN or infinite vertices, repair it"),
+    ("invalid vertex", "repair the mesh or export it anew"),
+    ("triangle mesh", "triangulate the mesh"),
+    ("Plugin .* not found", "check the spelling of the plugin's type"),
+    ("missing version", 'add version="3.0.0" to the <scene>'),
+    ("Parsing of XML", "mend the XML there"),
+    (r"read \d+ out of", "the mesh file is truncated, export it anew"),
+    ("past the end of the stream|inflate", "the mesh file is damaged, export it anew"),
+    ("I/O error|invalid PLY|invalid file format|value for field", "export the file anew"),
+)
+"""What to do about an error of Mitsuba, by what its message says; the first that fits
+counts."""
+
+T = TypeVar("T")
+
+
+@dataclass
+class ParsedScene:
+    """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``."""
+
+    config: Any
+    state: Any
+    elements: list[Element]
+    folder: Path
+    name: str
+
+    @property
+    def root(self) -> Element:
+        return self.elements[0]
+
+
+def reported(action: Callable[[], T], name: str) -> T:
+    """Runs a step of Mitsuba; its errors become a SceneError of one sentence."""
+    try:
+        return action()
+    except (RuntimeError, ValueError, TypeError, KeyError) as error:
+        message = one_sentence(str(error))
+        remedy = next((r for p, r in REMEDIES if re.search(p, message)), "mend the scene")
+        if name not in message:
+            message = f"scene '{name}': {message}"
+        raise SceneError(f"{message}; {remedy}") from error
+
+
+@contextmanager
+def resolving_from(folder: Path) -> Iterator[None]:
+    """Lets Mitsuba look for files in a folder first, as its own loader does."""
+    before = mitsuba.file_resolver()
+    resolver = mitsuba.FileResolver(before)
+    resolver.prepend(str(folder))
+    mitsuba.set_file_resolver(resolver)
+    try:
+        yield
+    finally:
+        mitsuba.set_file_resolver(before)
+
+
+def resolved(filename: str) -> Path:
+    """Where Mitsuba finds a file."""
+    return Path(str(mitsuba.file_resolver().resolve(filename)))
+
+
+def described(state: Any) -> list[Element]:
+    """The elements of a parsed scene, read from a copy: Mitsuba reports properties that no
+    plugin has asked for, and looking at them counts as asking."""
+    return from_state(mi.parser.ParserState(state))
+
+
+def parser_config(variant: str) -> Any:
+    getattr(mi, variant)
+    config = mi.parser.ParserConfig(variant)
+    # Merging loses the names of shapes and the order in which they were declared.
+    config.merge_meshes = False
+    config.merge_equivalent = False
+    return config
+
+
+def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
+    """Parses a scene file with values for its $parameters.
+
+    Raises SceneError if it does not exist or is malformed, if a parameter is not defined,
+    or if one of `defines` is not used.
+    """
+    if path.is_dir():
+        raise SceneError(f"scene '{path}' is a folder: name the XML file in it")
+    if not path.exists():
+        raise SceneError(f"scene file '{path}' does not exist: check its path")
+    config = parser_config(READING_VARIANT)
+    values = {key: str(value) for key, value in defines.items()}
+
+    def parse() -> Any:
+        state = mi.parser.parse_file(config, str(path), **values)
+        mi.parser.transform_upgrade(config, state)
+        mi.parser.transform_resolve(config, state)
+        return state
+
+    with resolving_from(path.parent):
+        state = reported(parse, str(path))
+    return ParsedScene(config, state, described(state), path.parent, str(path))
+
+
+def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
+    """Parses a dictionary as ``mi.load_dict`` takes it.
+
+    Raises SceneError if it is malformed, or holds objects of an unusable variant.
+    """
+    name = "dictionary"
+    variants = {o.variant_name() for o in embedded_objects(scene)} - {""}
+    if len(variants) > 1:
+        raise SceneError(
+            f"the scene {name} holds objects of several variants "
+            f"({', '.join(sorted(variants))}): "
+            "load all of them in one"
+        )
+    variant = variants.pop() if variants else READING_VARIANT
+    if not variant.endswith("_rgb"):
+        raise SceneError(
+            f"the scene {name} holds objects of the variant {variant}: load them in an "
+            "RGB variant"
+        )
+    config = parser_config(variant)
+
+    def parse() -> Any:
+        state = mi.parser.parse_dict(config, with_known_integrators(scene))
+        mi.parser.transform_upgrade(config, state)
+        mi.parser.transform_resolve(config, state)
+        return state
+
+    state = reported(parse, name)
+    elements = described(state)
+    for key, value in scene.items():
+        if is_own_integrator(value):
+            for child_name, element in elements[0].children:
+                if child_name == key:
+                    element.plugin = "mlrt"
+    return ParsedScene(config, state, elements, Path(), name)
+
+
+def is_own_integrator(value: object) -> bool:
+    return isinstance(value, Mapping) and value.get("type") == "mlrt"
+
+
+def with_known_integrators(scene: Mapping[str, Any]) -> dict[str, Any]:
+    """The dictionary without integrators that only the caller's variant knows."""
+    return {
+        key: {**value, "type": "direct"} if is_own_integrator(value) else value
+        for key, value in scene.items()
+    }
+
+
+def embedded_objects(value: object) -> Iterator[Any]:
+    """All Mitsuba objects that a scene dictionary holds."""
+    if isinstance(value, mi.Object):
+        yield value
+    elif isinstance(value, Mapping):
+        for child in value.values():
+            yield from embedded_objects(child)
+
+
+def instantiate(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
+    """Loads a parsed scene, and tells which element each object came from, by its id.
+
+    Integrators are not loaded: they are taken over, and may be unknown in the reading
+    variant.
+    """
+    by_id = {}
+    for number, (node, element) in enumerate(
+        zip(parsed.state.nodes, parsed.elements, strict=True)
+    ):
+        if element.kind == "integrator":
+            node.props = mi.Properties("direct")
+        node.props.set_id(f"n{number}")
+        by_id[f"n{number}"] = element
+    with resolving_from(parsed.folder):
+        scene = reported(
+            lambda: mi.parser.instantiate(parsed.config, parsed.state), parsed.name
+        )
+    return scene, by_id

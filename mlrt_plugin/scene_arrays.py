@@ -1,0 +1,145 @@
+"""A scene as plain, immutable data: what is left of it once Mitsuba has read it.
+
+The small classes mirror the structures of the same names in the native core's
+``render/scene.h`` field by field; lengths are in scene units, angles in radians, points
+and directions in world space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+NONE = 0xFFFFFFFF
+"""Marks the absence of a material, emitter or shape."""
+
+Vec2 = tuple[float, float]
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A run of faces that share a material and an emitter."""
+
+    first_face: int
+    face_count: int
+    material: int = NONE
+    emitter: int = NONE
+    vertex_normals: bool = False
+    flip_normals: bool = False
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """A light source; ``type`` is one of point, spot, directional and area."""
+
+    type: str
+    radiance: Vec3
+    position: Vec3 = (0.0, 0.0, 0.0)
+    direction: Vec3 = (0.0, 0.0, 1.0)
+    cutoff_angle: float = 0.0
+    beam_width: float = 0.0
+    shape: int = NONE
+    rectangle: bool = False
+    corner: Vec3 = (0.0, 0.0, 0.0)
+    edge_u: Vec3 = (0.0, 0.0, 0.0)
+    edge_v: Vec3 = (0.0, 0.0, 0.0)
+    sampling_weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera that looks along the third of its axes; the first points left."""
+
+    origin: Vec3
+    axes: tuple[Vec3, Vec3, Vec3]
+    tan_half_fov_x: float
+    near_clip: float = 0.01
+    far_clip: float = 1e4
+    principal_point_offset: Vec2 = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Film:
+    """The film, the part of it that is rendered (both in pixels), and its filter."""
+
+    width: int
+    height: int
+    crop_x: int
+    crop_y: int
+    crop_width: int
+    crop_height: int
+    filter: str = "gaussian"
+    filter_radius: float = 2.0
+    filter_stddev: float = 0.5
+    sample_border: bool = False
+
+
+@dataclass(frozen=True)
+class Feature:
+    """An element of the scene: a plugin of some kind, and whether it is rendered natively.
+
+    ``reason`` is empty if it is, and otherwise says what is not supported.
+    """
+
+    kind: str
+    plugin: str
+    id: str = ""
+    where: str = ""
+    reason: str = ""
+
+    @property
+    def native(self) -> bool:
+        return not self.reason
+
+    def __str__(self) -> str:
+        name = f"{self.kind} '{self.plugin}'"
+        if self.id:
+            name += f" with id '{self.id}'"
+        return f"{name} at {self.where}" if self.where else name
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """What of the light transport the scene's integrator asks for."""
+
+    integrator: str = "direct"
+    emitter_samples: int = 1
+    bsdf_samples: int = 1
+    hide_emitters: bool = False
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SceneArrays:
+    """Everything that rendering needs.
+
+    vertices: (V, 3) float32, world space.
+    faces: (F, 3) uint32, numbers of vertices; the faces of a shape follow one another.
+    normals: (V, 3) float32, unit; (0, 3) if no shape interpolates vertex normals.
+    materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
+    spp, base_seed: samples per pixel and seed of the sensor's sampler.
+    features: what the scene uses; warnings: what is approximated or ignored, a sentence
+    each.
+    """
+
+    vertices: npt.NDArray[np.float32]
+    faces: npt.NDArray[np.uint32]
+    normals: npt.NDArray[np.float32]
+    shapes: tuple[Shape, ...]
+    materials: npt.NDArray[np.float32]
+    emitters: tuple[Emitter, ...]
+    camera: Camera
+    film: Film
+    lighting: Lighting
+    spp: int
+    base_seed: int
+    features: tuple[Feature, ...]
+    warnings: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        for array in (self.vertices, self.faces, self.normals, self.materials):
+            array.setflags(write=False)

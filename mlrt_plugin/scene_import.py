@@ -1,0 +1,293 @@
+"""Reads a Mitsuba scene into plain arrays: from a file, a dictionary, or a loaded scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from . import camera as cameras
+from . import elements, emitters, features, meshes, parsing
+from . import mitsuba_objects as objects
+from .elements import Element
+from .errors import SceneError
+from .materials import MaterialTable
+from .mesh_files import check_mesh_file
+from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
+
+SceneSource = str | os.PathLike[str] | Mapping[str, Any] | Any
+"""A path of an XML file, a dictionary as ``mi.load_dict`` takes it, or a loaded
+``mi.Scene``."""
+
+
+@dataclass(frozen=True)
+class SceneSummary:
+    """What a scene uses, found without loading its meshes."""
+
+    features: tuple[Feature, ...]
+    lighting: Lighting
+    sensor_count: int
+
+
+def import_scene(
+    scene: SceneSource,
+    *,
+    sensor: int = 0,
+    defines: Mapping[str, object] | None = None,
+    resolution: tuple[int, int] | None = None,
+) -> SceneArrays:
+    """Reads a scene.
+
+    sensor: number of the sensor, in the order of declaration.
+    defines: values of $parameters, for a file only.
+    resolution: (width, height) of the film in pixels in place of the scene's own. The
+    field of view follows the film as the scene says, except that of a loaded scene, whose
+    horizontal field of view is kept.
+
+    Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
+    if it uses what is not rendered natively.
+    """
+    if resolution is not None and min(resolution) < 1:
+        raise SceneError(
+            f"resolution {resolution[0]}x{resolution[1]} is too small: both must be at "
+            "least 1"
+        )
+    if is_loaded_scene(scene):
+        if defines:
+            raise SceneError(
+                "parameters cannot be defined for a scene that is already loaded"
+            )
+        root = elements.from_scene(scene)
+        names: dict[str, Element] = {}
+        loaded, name = scene, "the scene"
+    else:
+        parsed = parse(scene, defines)
+        root, name = parsed.root, f"scene '{parsed.name}'"
+    check_contents(root, sensor, name)
+    found = features.list_features(root, sensor)
+    features.refuse_unsupported(found)
+    lighting = lighting_of(root) if not is_loaded_scene(scene) else loaded_lighting(scene)
+    warnings = features.warnings_about(found, lighting)
+    if not is_loaded_scene(scene):
+        check_transforms(parsed)
+        check_files(parsed)
+        if resolution is not None:
+            set_resolution(parsed, sensor, resolution)
+        loaded, names = parsing.instantiate(parsed)
+    return collect(loaded, names, sensor, resolution, found, lighting, warnings)
+
+
+def summarise(
+    scene: SceneSource, *, sensor: int = 0, defines: Mapping[str, object] | None = None
+) -> SceneSummary:
+    """What a scene uses, natively or not, without loading it.
+
+    Raises SceneError if it cannot be parsed.
+    """
+    if is_loaded_scene(scene):
+        root, lighting = elements.from_scene(scene), loaded_lighting(scene)
+    else:
+        root = parse(scene, defines).root
+        lighting = lighting_of(root)
+    return SceneSummary(
+        features.list_features(root, sensor),
+        lighting,
+        len(list(root.children_of("sensor"))),
+    )
+
+
+def is_loaded_scene(scene: object) -> bool:
+    return isinstance(scene, mi.Object)
+
+
+def parse(scene: SceneSource, defines: Mapping[str, object] | None) -> parsing.ParsedScene:
+    if isinstance(scene, Mapping):
+        if defines:
+            raise SceneError("parameters cannot be defined for a scene dictionary")
+        parsed = parsing.parse_dict(scene)
+    elif isinstance(scene, (str, os.PathLike)):
+        parsed = parsing.parse_file(Path(scene), defines or {})
+    else:
+        raise TypeError(
+            "a scene is a path, a dictionary or a loaded mi.Scene, not "
+            f"{type(scene).__name__}"
+        )
+    if parsed.root.kind != "scene":
+        raise SceneError(
+            f"scene '{parsed.name}' holds a {parsed.root.kind}: its root must be a scene"
+        )
+    return parsed
+
+
+def check_contents(root: Element, sensor: int, name: str) -> None:
+    """Raises SceneError unless there is something to see, by something, in some light."""
+    if not any(root.children_of("shape")):
+        raise SceneError(f"{name} has no shapes: add one")
+    if not any(element.kind == "emitter" for element in root.walk()):
+        raise SceneError(f"{name} has no emitter, so its image would be black: add one")
+    sensors = list(root.children_of("sensor"))
+    if not sensors:
+        raise SceneError(f"{name} has no sensor: add one of type perspective")
+    if not 0 <= sensor < len(sensors):
+        raise SceneError(
+            f"{name} has no sensor {sensor}: it has {len(sensors)}, counted from 0"
+        )
+    for film in sensors[sensor].children_of("film"):
+        for name in ("width", "height", "crop_width", "crop_height"):
+            size = film.properties.get(name, 1)
+            if not isinstance(size, int) or size < 1:
+                raise SceneError(f"{film} has {name} = {size}: it must be at least 1")
+
+
+def check_transforms(parsed: parsing.ParsedScene) -> None:
+    """Raises SceneError for a to_world that is not finite or flattens what it moves."""
+    for element in features.used_elements(parsed.root, -1):
+        transform = element.properties.get("to_world")
+        if transform is None:
+            continue
+        to_world = objects.matrix(transform)
+        if not np.isfinite(to_world).all():
+            raise SceneError(
+                f"{element} has a to_world with NaN or infinite entries: repair it"
+            )
+        stretch = np.linalg.svd(to_world[:3, :3], compute_uv=False)
+        if stretch[2] <= 1e-12 * stretch[0]:
+            raise SceneError(
+                f"{element} has a singular to_world, which flattens it: no scale may be 0"
+            )
+
+
+def check_files(parsed: parsing.ParsedScene) -> None:
+    """Raises SceneError for mesh files whose indices would make Mitsuba crash."""
+    checked = set()
+    with parsing.resolving_from(parsed.folder):
+        for element in features.used_elements(parsed.root, -1):
+            filename = element.properties.get("filename")
+            if element.kind != "shape" or filename is None:
+                continue
+            index = int(element.properties.get("shape_index", 0))
+            path = parsing.resolved(str(filename))
+            if (path, index) not in checked:
+                checked.add((path, index))
+                check_mesh_file(path, element.plugin, index)
+
+
+def set_resolution(
+    parsed: parsing.ParsedScene, sensor: int, resolution: tuple[int, int]
+) -> None:
+    """Changes the size of the chosen sensor's film before it is loaded."""
+    chosen = list(parsed.root.children_of("sensor"))[sensor]
+    for film in chosen.children_of("film"):
+        if "crop_width" in film.properties or "crop_height" in film.properties:
+            raise SceneError(
+                f"{film} has a crop window, so its resolution cannot be changed: remove "
+                "the crop"
+            )
+        number = next(n for n, e in enumerate(parsed.elements) if e is film)
+        node = parsed.state.nodes[number]
+        node.props["width"], node.props["height"] = resolution
+
+
+def lighting_of(root: Element) -> Lighting:
+    """What the integrator of a parsed scene asks for, by default `direct`."""
+    for integrator in root.children_of("integrator"):
+        return features.lighting_of(integrator.properties, integrator.plugin)
+    return Lighting()
+
+
+def loaded_lighting(scene: Any) -> Lighting:
+    """What the integrator of a loaded scene asks for."""
+    integrator = scene.integrator()
+    if integrator is None:
+        return Lighting()
+    parameters: dict[str, Any] = {
+        "hide_emitters": bool(getattr(integrator, "hide_emitters", False))
+    }
+    for name in ("emitter_samples", "bsdf_samples", "max_depth"):
+        text = objects.described(integrator, name)
+        if text:
+            depth = int(text)
+            parameters[name] = -1 if depth == 0xFFFFFFFF else depth
+    return features.lighting_of(parameters, objects.plugin_name(integrator))
+
+
+def collect(
+    scene: Any,
+    names: dict[str, Element],
+    sensor: int,
+    resolution: tuple[int, int] | None,
+    found: tuple[Feature, ...],
+    lighting: Lighting,
+    warnings: list[str],
+) -> SceneArrays:
+    """Copies a loaded scene into arrays; `names` gives elements by the ids of objects."""
+
+    def name_of(instance: Any) -> str:
+        element = names.get(instance.id())
+        if element is None:
+            element = Element(
+                elements.kind_of(instance), objects.plugin_name(instance), instance.id()
+            )
+        return str(element)
+
+    shapes = list(scene.shapes())
+    sources = list(scene.emitters())
+    shape_names = [name_of(shape) for shape in shapes]
+    geometry = meshes.gather(shapes, shape_names)
+    materials = MaterialTable()
+    emitter_of_shape = [NONE] * len(shapes)
+    shape_of_emitter = [NONE] * len(sources)
+    for number, shape in enumerate(shapes):
+        own = shape.emitter()
+        for index, source in enumerate(sources):
+            if own is not None and own is source:
+                emitter_of_shape[number], shape_of_emitter[index] = index, number
+    loaded_sensor = scene.sensors()[sensor]
+    film, ignored = cameras.read_film(loaded_sensor.film(), name_of(loaded_sensor.film()))
+    if resolution is not None:
+        film = cameras.resized(film, resolution)
+    sampler = loaded_sensor.sampler()
+    return SceneArrays(
+        vertices=geometry.vertices,
+        faces=geometry.faces,
+        normals=geometry.normals,
+        shapes=tuple(
+            Shape(
+                first_face=geometry.first_faces[number],
+                face_count=geometry.face_counts[number],
+                material=materials.add(shape.bsdf(), shape_names[number]),
+                emitter=emitter_of_shape[number],
+                vertex_normals=geometry.vertex_normals[number],
+                flip_normals=geometry.flip_normals[number],
+            )
+            for number, shape in enumerate(shapes)
+        ),
+        materials=materials.array(),
+        emitters=tuple(
+            emitters.read_emitter(
+                source, name_of(source), shape, rectangle_corners(geometry, shapes, shape)
+            )
+            for source, shape in zip(sources, shape_of_emitter, strict=True)
+        ),
+        camera=cameras.read_camera(loaded_sensor, name_of(loaded_sensor)),
+        film=film,
+        lighting=lighting,
+        spp=int(sampler.sample_count()),
+        base_seed=int(objects.described(sampler, "base_seed", "0")),
+        features=found,
+        warnings=tuple(dict.fromkeys([*warnings, *ignored])),
+    )
+
+
+def rectangle_corners(geometry: meshes.Geometry, shapes: list[Any], number: int) -> Any:
+    """(4, 3) vertices of a shape if it is a rectangle, else None."""
+    if number == NONE or objects.plugin_name(shapes[number]) != "rectangle":
+        return None
+    first = geometry.first_faces[number]
+    indices = np.unique(geometry.faces[first : first + geometry.face_counts[number]])
+    return geometry.vertices[indices]

@@ -1,0 +1,44 @@
+"""Fixtures that tests of several folders share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import mitsuba as mi
+import pytest
+import repository
+import scene_files
+
+
+@pytest.fixture
+def shared_scene() -> Callable[[str], Path]:
+    """Finds a third-party scene beside the checkout; the test is skipped if it is
+    absent."""
+
+    def find(name: str) -> Path:
+        path = repository.ROOT.parent / "shared" / "scenes" / name
+        if not path.is_file():
+            pytest.skip(f"third-party scene {name} is not beside the checkout")
+        return path
+
+    return find
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a scene of `scene_files.scene_xml` into the test's folder."""
+
+    def write(name: str = "scene.xml", **parts: str) -> Path:
+        path = tmp_path / name
+        path.write_text(scene_files.scene_xml(**parts))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def scalar_variant() -> Iterator[None]:
+    """Runs a test in `scalar_rgb`."""
+    mi.set_variant("scalar_rgb")
+    yield
