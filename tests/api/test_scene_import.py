@@ -11,12 +11,10 @@ from pathlib import Path
 import mitsuba as mi
 import numpy as np
 import pytest
-import repository
 import scene_files
 
-from mlrt_plugin.errors import UnsupportedFeature
 from mlrt_plugin.scene_arrays import NONE, Camera
-from mlrt_plugin.scene_import import import_scene, summarise
+from mlrt_plugin.scene_import import import_scene
 
 SceneFile = Callable[..., Path]
 
@@ -257,8 +255,8 @@ def test_arrays_cannot_be_changed(scene_file: SceneFile) -> None:
 
 def test_sampler_and_integrator(scene_file: SceneFile) -> None:
     sampler = """<sampler type="independent">
-        <integer name="sample_count" value="9"/><integer name="seed"
-        value="4"/></sampler>"""
+        <integer name="sample_count" value="9"/>
+        <integer name="seed" value="4"/></sampler>"""
     sensor = f'<sensor type="perspective">{sampler}{scene_files.FILM}</sensor>'
     integrator = """<integrator type="path"><integer name="max_depth" value="2"/>
         <boolean name="hide_emitters" value="true"/></integrator>"""
@@ -267,36 +265,6 @@ def test_sampler_and_integrator(scene_file: SceneFile) -> None:
     assert scene.lighting.integrator == "path"
     assert scene.lighting.hide_emitters
     assert scene.warnings == ()
-
-
-GLOWING = '<shape type="rectangle"><emitter type="area"/></shape>'
-MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
-
-
-@pytest.mark.parametrize(
-    ("parts", "named"),
-    [
-        ({"integrator": '<integrator type="path"/>'}, "max_depth = -1"),
-        ({"integrator": '<integrator type="depth"/>'}, "integrator 'depth'"),
-        ({"sensor": MULTIJITTER}, "sampler 'multijitter'"),
-        (
-            {"integrator": '<integrator type="direct"/>', "emitters": GLOWING},
-            "BSDF samples",
-        ),
-        (
-            {
-                "integrator": '<integrator type="direct">'
-                '<integer name="emitter_samples" value="4"/></integrator>'
-            },
-            "emitter_samples = 4",
-        ),
-    ],
-)
-def test_approximations_are_named(
-    scene_file: SceneFile, parts: dict[str, str], named: str
-) -> None:
-    (warning,) = import_scene(scene_file(**parts)).warnings
-    assert named in warning
 
 
 def test_choice_of_the_sensor(scene_file: SceneFile) -> None:
@@ -378,58 +346,3 @@ def test_variant_of_the_caller_stays_set(
         assert mi.variant() == "scalar_spectral"
     finally:
         mi.set_variant("scalar_rgb")
-
-
-UNSUPPORTED = {
-    "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
-    "constant": {"emitters": '<emitter type="constant" id="sky"/>'},
-    "bitmap": {
-        "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
-        '<texture type="bitmap" name="reflectance" id="wood">'
-        '<string name="filename" value="wood.png"/></texture></bsdf></shape>'
-    },
-    "conductor": {"shapes": '<shape type="cube"><bsdf type="conductor" id="tin"/></shape>'},
-    "twosided": {
-        "shapes": '<shape type="cube"><bsdf type="twosided"><bsdf
-        type="plastic"/></bsdf></shape>'
-    },
-    "thinlens": {"sensor": scene_files.SENSOR.replace("perspective", "thinlens")},
-    "tent": {"sensor": scene_files.SENSOR.replace('"box"', '"tent"')},
-    "homogeneous": {
-        "shapes": '<shape type="cube"><medium type="homogeneous" name="interior"/></shape>'
-    },
-}
-
-
-@pytest.mark.parametrize("plugin", UNSUPPORTED)
-def test_unsupported_features_are_named(scene_file: SceneFile, plugin: str) -> None:
-    path = scene_file(**UNSUPPORTED[plugin])
-    with pytest.raises(UnsupportedFeature, match=f"'{plugin}'.*scene.xml line") as caught:
-        import_scene(path)
-    assert "\n" not in str(caught.value)
-    features = summarise(path).features
-    assert plugin in {f.plugin for f in features if not f.native}
-
-
-def test_what_is_not_used_does_not_matter(scene_file: SceneFile) -> None:
-    import_scene(scene_file(extra='<bsdf type="plastic" id="unused"/>'))
-
-
-@pytest.mark.parametrize("name", ["cornell-box", "office"])
-def test_scenes_of_the_project_are_native(name: str) -> None:
-    path = repository.ROOT / "scenes" / name / f"{name}.xml"
-    scene = import_scene(path)
-    assert all(feature.native for feature in scene.features)
-    assert len(scene.faces) == sum(s.face_count for s in scene.shapes)
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["bunny/bunny.xml", "toasters/toasters.xml", "living-room/scene_direct.xml"],
-)
-def test_third_party_scenes_are_native(
-    shared_scene: Callable[[str], Path], name: str
-) -> None:
-    scene = import_scene(shared_scene(name), resolution=(8, 8))
-    assert np.isfinite(scene.vertices).all()
-    assert scene.warnings == ()
