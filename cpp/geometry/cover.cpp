@@ -1,5 +1,7 @@
 #include "geometry/cover.h"
 
+#include <bit>
+
 namespace mlrt {
 
 namespace {
@@ -14,9 +16,22 @@ double signed_area(std::span<const Vec2d> p) {
     return sum / 2;
 }
 
+// A triangle cut four times; as in clipping to a cell, a cut leaves at most n + n / 2
+// corners.
+struct SmallPolygon {
+    std::array<Vec2d, 13> corners;
+    size_t count = 0;
+
+    size_t size() const { return count; }
+    void clear() { count = 0; }
+    void push_back(Vec2d p) { corners[count++] = p; }
+    const Vec2d &operator[](size_t i) const { return corners[i]; }
+    operator std::span<const Vec2d>() const { return {corners.data(), count}; }
+};
+
 // The part of a convex polygon where `distance`, an affine function of the point, is >= 0.
-template <typename Distance>
-void cut(const Polygon &in, Polygon &out, const Distance &distance) {
+template <typename AnyPolygon, typename Distance>
+void cut(const AnyPolygon &in, AnyPolygon &out, const Distance &distance) {
     out.clear();
     for (size_t i = 0; i < in.size(); ++i) {
         const Vec2d a = in[i], b = in[i + 1 < in.size() ? i + 1 : 0];
@@ -76,10 +91,11 @@ void subtract(const Polygon &piece, const Triangle2 &triangle,
     }
 }
 
-// Halving the rectangle keeps the lists short and the whole near N log N; the limits bound
-// the work where many triangles overlap in one place. Chosen.
-constexpr size_t SUBTRACT_BELOW = 8;
-constexpr int MAX_HALVINGS = 24;
+// Halving the rectangle until lists are short keeps the whole near N log N. There are at
+// most about 4 N parts, so that triangles that lie on top of each other, whose lists never
+// get short, cannot make it go on; the limit of pieces bounds the work on such a part.
+// Chosen.
+constexpr size_t SUBTRACT_BELOW = 16;
 constexpr size_t MAX_PIECES = 512;
 
 double by_subtraction(const Rectangle &r, std::span<const Triangle2> triangles) {
@@ -130,7 +146,9 @@ double uncovered(const Rectangle &r, std::span<const Triangle2> triangles, doubl
 } // namespace
 
 double area_within(const Triangle2 &triangle, const Rectangle &r) {
-    Polygon polygon(triangle.begin(), triangle.end()), next;
+    SmallPolygon polygon, next;
+    for (Vec2d corner : triangle)
+        polygon.push_back(corner);
     cut(polygon, next, [&](Vec2d p) { return p.x - r.lo.x; });
     cut(next, polygon, [&](Vec2d p) { return r.hi.x - p.x; });
     cut(polygon, next, [&](Vec2d p) { return p.y - r.lo.y; });
@@ -144,7 +162,7 @@ double uncovered_area(const Rectangle &rectangle, std::span<const Triangle2> tri
     oriented.reserve(triangles.size());
     for (const Triangle2 &triangle : triangles)
         oriented.push_back(counter_clockwise(triangle));
-    return uncovered(rectangle, oriented, enough, MAX_HALVINGS);
+    return uncovered(rectangle, oriented, enough, std::bit_width(triangles.size()) + 1);
 }
 
 } // namespace mlrt

@@ -24,7 +24,10 @@ constexpr double AREA_FLOOR_NUMERATOR = 0.3;
 constexpr double MIN_AREA_FLOOR = 1e-7;
 constexpr double MAX_AREA_FLOOR = 1e-4;
 
-// Depth limit in the form of Havran 2000, with the constants of pbrt.
+// Limit of the splits on a path, in the form of Havran 2000 with the constants of pbrt.
+// Splits of rule 1 only cut off empty space and do not count for it, or they would leave
+// cells full of triangles unsplit; they do count for MAX_TREE_DEPTH and for a limit that
+// the caller sets.
 constexpr double DEPTH_OFFSET = 8;
 constexpr double DEPTH_PER_DOUBLING = 1.3;
 
@@ -50,16 +53,19 @@ double area_floor_of(const BuildOptions &options, uint64_t count) {
     return std::clamp(AREA_FLOOR_NUMERATOR / double(count), MIN_AREA_FLOOR, MAX_AREA_FLOOR);
 }
 
-int max_depth_of(const BuildOptions &options, uint64_t count) {
-    if (options.max_depth > 0)
-        return std::min(options.max_depth, MAX_TREE_DEPTH);
-    return std::min(int(DEPTH_OFFSET + DEPTH_PER_DOUBLING * std::log2(double(count))),
-                    MAX_TREE_DEPTH);
+int max_depth_of(const BuildOptions &options) {
+    return options.max_depth > 0 ? std::min(options.max_depth, MAX_TREE_DEPTH)
+                                 : MAX_TREE_DEPTH;
+}
+
+int max_splits_of(uint64_t count) {
+    return int(DEPTH_OFFSET + DEPTH_PER_DOUBLING * std::log2(double(count)));
 }
 
 // What the path from the root leaves to a cell.
 struct Allowance {
-    int depth; // levels that are left
+    int depth;  // levels that are left
+    int splits; // of which others than those of rule 1
     int bad_splits;
     double duplication; // factor by which references may still multiply
 };
@@ -100,6 +106,8 @@ public:
             }
         }
 
+        if (allowance.splits == 0)
+            return make_leaf(node, std::move(contents));
         sweep(contents, cell, options_, swept_);
         std::optional<Candidate> chosen;
         if (options_.rule_flat_cell)
@@ -116,6 +124,7 @@ public:
         if (bad && (allowance.bad_splits == 0 || count <= MAX_PLAIN_LEAF))
             return make_leaf(node, std::move(contents));
         Allowance rest = allowance;
+        --rest.splits;
         rest.bad_splits -= bad;
         rest.duplication *=
             double(count) / double(chosen->lower_count + chosen->upper_count);
@@ -254,7 +263,7 @@ BuiltTree build_kd_tree(std::vector<Triangle> triangles, const BuildOptions &opt
         SweepBuilder builder(tree, report, options, count);
         const Subtree root =
             builder.build(0, tree.bounds, make_contents(std::move(references)),
-                          {max_depth_of(options, count), MAX_BAD_SPLITS,
+                          {max_depth_of(options), max_splits_of(count), MAX_BAD_SPLITS,
                            MAX_DUPLICATION + SPARE_REFERENCES / double(count)});
         tree.depth = report.depth = root.depth;
         report.sah_cost = root.cost / options.traversal_cost;
