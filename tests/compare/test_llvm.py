@@ -134,7 +134,7 @@ import drjit
 assert drjit.has_backend(drjit.JitBackend.LLVM)
 assert drjit.detail.llvm_version() == chosen.version, drjit.detail.llvm_version()
 """
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+    subprocess.run([sys.executable, "-P", "-c", program], check=True, timeout=120)
 
 
 def test_too_late_is_said_when_drjit_has_no_usable_llvm(tmp_path: Path) -> None:
@@ -151,4 +151,4 @@ except llvm.LlvmUnavailable as error:
 else:
     raise SystemExit("a libLLVM that aborts the process was accepted")
 """
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+    subprocess.run([sys.executable, "-P", "-c", program], check=True, timeout=120)

@@ -1,0 +1,165 @@
+"""The Mitsuba side: its own ``direct`` integrator in llvm_ad_rgb, asked for what MLRT
+renders."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import drjit as dr
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from mlrt_plugin.errors import SceneError, one_sentence
+from mlrt_plugin.parsing import resolving_from
+
+from .settings import Settings
+
+# Mitsuba's type stubs do not know what depends on the variant.
+mi: Any = mitsuba
+
+VARIANT = "llvm_ad_rgb"
+UNITS = {"ms": 1e-3, "s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+class MitsubaRenderer:
+    """A scene loaded by Mitsuba, to be rendered as often as one likes.
+
+    ``llvm.activate`` comes before the import of this module. Raises SceneError, one
+    sentence, if Mitsuba cannot load the scene.
+    """
+
+    name = f"Mitsuba {mi.__version__} {VARIANT}"
+
+    def __init__(self, settings: Settings) -> None:
+        mi.set_variant(VARIANT)
+        if settings.threads is not None:
+            dr.set_thread_count(settings.threads)
+        self._settings = settings
+        start = time.perf_counter()
+        with _captured_log() as log:
+            try:
+                self._load()
+            except RuntimeError as error:
+                raise SceneError(
+                    f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
+                ) from error
+            dr.sync_thread()
+            text = log.read_log()
+        seconds = time.perf_counter() - start
+        self.build = _build_seconds(text)
+        self.load = seconds - (self.build or 0.0)
+        self.warnings = [line for line in text.splitlines() if " WARN " in line]
+        self.kernels_compiled = self.kernels_from_disk = 0
+        self._frames = 0
+        self._tensor: Any = None
+
+    def frame(self) -> float:
+        """Renders a frame and returns the seconds that it took, kernels evaluated."""
+        dr.sync_thread()
+        # The history costs time of its own, so only the first frame, which compiles, has
+        # it.
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, self._frames == 0):
+            start = time.perf_counter()
+            self._tensor = mi.render(
+                self._scene,
+                sensor=self._settings.sensor,
+                integrator=self._integrator,
+                seed=self._settings.seed,
+                spp=self.spp,
+            )
+            dr.eval(self._tensor)
+            dr.sync_thread()
+            seconds = time.perf_counter() - start
+            if self._frames == 0:
+                self._count_kernels()
+        self._frames += 1
+        return seconds
+
+    @property
+    def image(self) -> NDArray[np.float32]:
+        """The last frame, (H, W, 3) of linear radiance."""
+        return np.array(self._tensor, np.float32)
+
+    def _load(self) -> None:
+        """As mi.load_file does, with sampler, film size and integrator replaced."""
+        settings = self._settings
+        config = mi.parser.ParserConfig(VARIANT)
+        with resolving_from(settings.scene.parent):
+            state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
+            hide_emitters = _align(state, settings)
+            # Merging moves meshes to the end, and lights with them; the order of the
+            # emitters decides what a random number means, so it has to stay as declared.
+            config.merge_meshes = not any(
+                node.type == mi.ObjectType.Emitter and node.props.plugin_name() == "area"
+                for node in state.nodes
+            )
+            mi.parser.transform_all(config, state)
+            self._scene = mi.parser.instantiate(config, state)
+        self._integrator = mi.load_dict(
+            {
+                "type": "direct",
+                "emitter_samples": 1,
+                "bsdf_samples": 0,
+                "hide_emitters": hide_emitters,
+            }
+        )
+        self.spp = settings.spp or int(
+            self._scene.sensors()[settings.sensor].sampler().sample_count()
+        )
+
+    def _count_kernels(self) -> None:
+        for entry in dr.kernel_history([dr.KernelType.JIT]):
+            self.kernels_from_disk += bool(entry["cache_disk"])
+            self.kernels_compiled += not entry["cache_hit"]
+
+
+def _align(state: Any, settings: Settings) -> bool:
+    """Gives every sensor the independent sampler and the wanted size; tells
+    hide_emitters."""
+    hide_emitters = False
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Sampler:
+            sampler = mi.Properties("independent")
+            sampler.set_id(node.props.id())
+            for key in ("sample_count", "seed"):
+                if key in node.props:
+                    sampler[key] = node.props[key]
+            node.props = sampler
+        elif node.type == mi.ObjectType.Film and settings.resolution is not None:
+            node.props["width"], node.props["height"] = settings.resolution
+        elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
+            hide_emitters = bool(node.props["hide_emitters"])
+    return hide_emitters
+
+
+@contextmanager
+def _captured_log() -> Iterator[Any]:
+    """Sends Mitsuba's messages to a file for a while, those of level Info too."""
+    logger = mi.logger()
+    appenders = [logger.appender(i) for i in range(logger.appender_count())]
+    level = logger.log_level()
+    with tempfile.TemporaryDirectory() as folder:
+        log = mi.StreamAppender(str(Path(folder) / "log"))
+        logger.clear_appenders()
+        logger.add_appender(log)
+        logger.set_log_level(mi.LogLevel.Info)
+        try:
+            yield log
+        finally:
+            logger.set_log_level(level)
+            logger.clear_appenders()
+            for appender in appenders:
+                logger.add_appender(appender)
+
+
+def _build_seconds(log: str) -> float | None:
+    """What Mitsuba itself says that Embree's build took; None if it does not say so."""
+    found = re.findall(r"Embree ready\. \(took ([\d.e+-]+)(ms|s|m|h)\)", log)
+    return sum(float(number) * UNITS[unit] for number, unit in found) if found else None

@@ -1,0 +1,56 @@
+"""Timings of two renderers that share a machine."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Timings:
+    """Wall-clock seconds of one renderer."""
+
+    load: float
+    """From the scene file to memory, without ``build``."""
+    build: float | None
+    """Acceleration structure; None if the renderer does not tell it apart from ``load``."""
+    first: float
+    """First frame, with all that is done only once."""
+    frames: tuple[float, ...]
+    """The frames after the first."""
+    kernels_compiled: int | None = None
+    """Kernels that the first frame compiled; None for a renderer without a JIT compiler."""
+    kernels_from_disk: int | None = None
+    """Kernels that an earlier process had compiled."""
+
+    @property
+    def steady(self) -> float:
+        """Median of the frames after the first."""
+        return statistics.median(self.frames)
+
+    @property
+    def jit(self) -> float | None:
+        """What tracing and compiling kernels took: the first frame without a steady one."""
+        return None if self.kernels_compiled is None else self.first - self.steady
+
+    def as_dict(self) -> dict[str, Any]:
+        return {**asdict(self), "steady": self.steady, "jit": self.jit}
+
+
+def interleave(
+    first: Callable[[], float], second: Callable[[], float], rounds: int
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Seconds that two functions report, called in the order A B B A, twice each a round.
+
+    A drift of the machine's speed within a round weighs on both alike.
+    """
+    a: list[float] = []
+    b: list[float] = []
+    for _ in range(rounds):
+        a.append(first())
+        b.append(second())
+        b.append(second())
+        a.append(first())
+    return tuple(a), tuple(b)
