@@ -1,7 +1,8 @@
 """Chooses the native core for this processor.
 
-The core is built once an instruction set; ``core`` is the one that was chosen. The environment
-variable ``MLRT_ISA`` (``avx2``, ``avx512``, ...) overrides the choice of the widest.
+The core is built once an instruction set; ``core`` is the one that was chosen. The
+environment variable ``MLRT_ISA`` (``avx2``, ``avx512``, ...) overrides the choice of the
+widest.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from types import ModuleType
 
 import drjit  # noqa: F401  (loads the thread pool library that the core is linked to)
 
-from . import _cpu
+from . import _cpu  # type: ignore[attr-defined]
 
 
 def available_isas() -> list[str]:
-    """Instruction sets that were built and that this processor supports, the widest first."""
+    """Instruction sets that were built and that this processor has, the widest first."""
     return [
         isa
         for isa in _cpu.supported_isas()
@@ -45,4 +46,4 @@ def load_core(isa: str | None = None) -> ModuleType:
     return importlib.import_module(f"{__package__}._core_{isa}")
 
 
-core = load_core(os.environ.get("MLRT_ISA") or None)
+core: ModuleType = load_core(os.environ.get("MLRT_ISA") or None)

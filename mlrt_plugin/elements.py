@@ -114,12 +114,12 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
     return element
 
 
-def from_scene(scene: Any) -> Element:
-    """The element of a loaded scene."""
+def from_scene(scene: Any, sensors: list[Any]) -> Element:
+    """The element of a loaded scene, seen by the given sensors."""
     root = Element("scene", "scene", scene.id())
     emitters_of_shapes = [shape.emitter() for shape in scene.shapes()]
     for instance in [
-        *scene.sensors(),
+        *sensors,
         *scene.shapes(),
         *(e for e in scene.emitters() if not any(e is s for s in emitters_of_shapes)),
         *([scene.integrator()] if scene.integrator() is not None else []),

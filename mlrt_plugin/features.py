@@ -7,6 +7,7 @@ from typing import Any
 
 from .elements import Element
 from .errors import UnsupportedFeature
+from .options import TRACE_OPTIONS
 from .scene_arrays import Feature, Lighting
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
@@ -18,6 +19,8 @@ FILTERS = ("box", "gaussian")
 SAMPLERS = ("independent",)
 INTEGRATORS = ("direct", "path", "mlrt")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65", "regular", "irregular")
+OWN_PARAMETERS = ("hide_emitters", "emitter_samples", "bsdf_samples", *TRACE_OPTIONS)
+"""Parameters of the integrator `mlrt`."""
 
 NATIVE = {
     "shape": SHAPES,
@@ -100,7 +103,9 @@ def lighting_of(parameters: dict[str, Any], integrator: str) -> Lighting:
     return Lighting(
         integrator=integrator,
         emitter_samples=int(parameters.get("emitter_samples", shading)),
-        bsdf_samples=int(parameters.get("bsdf_samples", shading)),
+        bsdf_samples=int(
+            parameters.get("bsdf_samples", 0 if integrator == "mlrt" else shading)
+        ),
         hide_emitters=bool(parameters.get("hide_emitters", False)),
         parameters=dict(parameters),
     )
@@ -153,7 +158,19 @@ def warnings_about(features: tuple[Feature, ...], lighting: Lighting) -> list[st
                 "noisier or "
                 "less noisy than in Mitsuba; the expected image is the same"
             )
-    elif integrator not in ("mlrt", ""):
+    elif integrator == "mlrt":
+        for name in lighting.parameters:
+            if name not in OWN_PARAMETERS:
+                raise UnsupportedFeature(
+                    f"integrator 'mlrt' has no parameter '{name}': choose from "
+                    f"{', '.join(OWN_PARAMETERS)}"
+                )
+        if lighting.emitter_samples != 1 or lighting.bsdf_samples != 0:
+            raise UnsupportedFeature(
+                "integrator 'mlrt' takes one emitter sample and no BSDF sample: set "
+                "emitter_samples to 1 and bsdf_samples to 0, or leave them out"
+            )
+    else:
         warnings.append(
             f"integrator '{integrator}' is not supported: direct illumination is rendered "
             "instead"

@@ -37,6 +37,7 @@ PLUGIN_OF_CLASS = {
     "PathIntegrator": "path",
     "DepthIntegrator": "depth",
     "AOVIntegrator": "aov",
+    "MlrtIntegrator": "mlrt",
     "UniformSpectrum": "uniform",
     "SRGBReflectanceSpectrum": "srgb",
 }

@@ -20,7 +20,7 @@ from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
 
-SceneSource = str | os.PathLike[str] | Mapping[str, Any] | Any
+SceneSource = Any
 """A path of an XML file, a dictionary as ``mi.load_dict`` takes it, or a loaded
 ``mi.Scene``."""
 
@@ -37,13 +37,14 @@ class SceneSummary:
 def import_scene(
     scene: SceneSource,
     *,
-    sensor: int = 0,
+    sensor: Any = 0,
     defines: Mapping[str, object] | None = None,
     resolution: tuple[int, int] | None = None,
 ) -> SceneArrays:
     """Reads a scene.
 
-    sensor: number of the sensor, in the order of declaration.
+    sensor: number of the sensor, in the order of declaration; of a loaded scene also a
+    sensor itself.
     defines: values of $parameters, for a file only.
     resolution: (width, height) of the film in pixels in place of the scene's own. The
     field of view follows the film as the scene says, except that of a loaded scene, whose
@@ -62,7 +63,8 @@ def import_scene(
             raise SceneError(
                 "parameters cannot be defined for a scene that is already loaded"
             )
-        root = elements.from_scene(scene)
+        sensors, sensor = sensors_of(scene, sensor)
+        root = elements.from_scene(scene, sensors)
         names: dict[str, Element] = {}
         loaded, name = scene, "the scene"
     else:
@@ -79,7 +81,8 @@ def import_scene(
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
         loaded, names = parsing.instantiate(parsed)
-    return collect(loaded, names, sensor, resolution, found, lighting, warnings)
+        sensors = list(loaded.sensors())
+    return collect(loaded, names, sensors[sensor], resolution, found, lighting, warnings)
 
 
 def summarise(
@@ -90,7 +93,7 @@ def summarise(
     Raises SceneError if it cannot be parsed.
     """
     if is_loaded_scene(scene):
-        root, lighting = elements.from_scene(scene), loaded_lighting(scene)
+        root, lighting = elements.from_scene(scene, scene.sensors()), loaded_lighting(scene)
     else:
         root = parse(scene, defines).root
         lighting = lighting_of(root)
@@ -101,8 +104,19 @@ def summarise(
     )
 
 
-def is_loaded_scene(scene: object) -> bool:
+def is_loaded_scene(scene: SceneSource) -> bool:
     return isinstance(scene, mi.Object)
+
+
+def sensors_of(scene: Any, sensor: Any) -> tuple[list[Any], int]:
+    """The sensors of a loaded scene and the number of the chosen one, maybe a stranger."""
+    sensors = list(scene.sensors())
+    if not isinstance(sensor, mi.Object):
+        return sensors, int(sensor)
+    for number, candidate in enumerate(sensors):
+        if candidate is sensor:
+            return sensors, number
+    return [*sensors, sensor], len(sensors)
 
 
 def parse(scene: SceneSource, defines: Mapping[str, object] | None) -> parsing.ParsedScene:
@@ -205,9 +219,8 @@ def loaded_lighting(scene: Any) -> Lighting:
     integrator = scene.integrator()
     if integrator is None:
         return Lighting()
-    parameters: dict[str, Any] = {
-        "hide_emitters": bool(getattr(integrator, "hide_emitters", False))
-    }
+    parameters = dict(getattr(integrator, "mlrt_parameters", {}))
+    parameters["hide_emitters"] = bool(getattr(integrator, "hide_emitters", False))
     for name in ("emitter_samples", "bsdf_samples", "max_depth"):
         text = objects.described(integrator, name)
         if text:
@@ -219,7 +232,7 @@ def loaded_lighting(scene: Any) -> Lighting:
 def collect(
     scene: Any,
     names: dict[str, Element],
-    sensor: int,
+    sensor: Any,
     resolution: tuple[int, int] | None,
     found: tuple[Feature, ...],
     lighting: Lighting,
@@ -247,11 +260,10 @@ def collect(
         for index, source in enumerate(sources):
             if own is not None and own is source:
                 emitter_of_shape[number], shape_of_emitter[index] = index, number
-    loaded_sensor = scene.sensors()[sensor]
-    film, ignored = cameras.read_film(loaded_sensor.film(), name_of(loaded_sensor.film()))
+    film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
-    sampler = loaded_sensor.sampler()
+    sampler = sensor.sampler()
     return SceneArrays(
         vertices=geometry.vertices,
         faces=geometry.faces,
@@ -274,7 +286,7 @@ def collect(
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),
-        camera=cameras.read_camera(loaded_sensor, name_of(loaded_sensor)),
+        camera=cameras.read_camera(sensor, name_of(sensor)),
         film=film,
         lighting=lighting,
         spp=int(sampler.sample_count()),

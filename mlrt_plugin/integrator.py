@@ -1,0 +1,98 @@
+"""The plugin ``<integrator type="mlrt">``.
+
+It is known to Mitsuba as soon as this package is imported, in the variant that is set and
+in all that are set later. Its parameters are `hide_emitters`, and the options of tracing
+that `mlrt_plugin.options` lists.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+
+from .errors import UnsupportedFeature
+from .options import TRACE_OPTIONS
+from .render import render
+
+mitsuba: Any = mi
+"""For what Mitsuba's type stubs leave out."""
+
+PLUGIN = "mlrt"
+SAMPLE_COUNTS = {"emitter_samples": 1, "bsdf_samples": 0}
+"""Parameters of `direct` that the plugin also takes, with the only values that it
+supports."""
+
+_registered: set[str] = set()
+
+
+def integrator_class(module: Any) -> type:
+    """The integrator for a variant; Mitsuba's classes differ from variant to variant."""
+
+    class MlrtIntegrator(module.SamplingIntegrator):  # type: ignore[misc]
+        """Direct illumination by multi-level ray tracing on the CPU, in RGB variants."""
+
+        def __init__(self, props: Any) -> None:
+            # Mitsuba warns of slow Python in scalar variants, but this is native.
+            level = mitsuba.log_level()
+            mitsuba.set_log_level(mi.LogLevel.Error)
+            try:
+                super().__init__(props)
+            finally:
+                mitsuba.set_log_level(level)
+            for name, supported in SAMPLE_COUNTS.items():
+                if props.get(name, supported) != supported:
+                    raise UnsupportedFeature(
+                        f"integrator '{PLUGIN}' supports {name} = {supported} only"
+                    )
+            self.mlrt_parameters = {
+                name: props.get(name) for name in TRACE_OPTIONS if props.has_property(name)
+            }
+
+        def class_name(self) -> str:
+            return "MlrtIntegrator"
+
+        def to_string(self) -> str:
+            return f"MlrtIntegrator[{self.mlrt_parameters}]"
+
+        def render(
+            self,
+            scene: Any,
+            sensor: Any = 0,
+            seed: Any = 0,
+            spp: int = 0,
+            develop: bool = True,
+            evaluate: bool = True,
+        ) -> Any:
+            """Renders natively; the image is not kept in the sensor's film."""
+            result = render(
+                scene,
+                sensor=sensor,
+                seed=int(np.asarray(seed).reshape(-1)[0]),
+                spp=spp or None,
+                hide_emitters=self.hide_emitters,
+                **self.mlrt_parameters,
+            )
+            return module.TensorXf(result.image) if develop else module.TensorXf()
+
+    return MlrtIntegrator
+
+
+def register(variant: str | None) -> None:
+    """Makes the plugin known in a variant, once."""
+    if variant is None or variant in _registered:
+        return
+    module = getattr(mi, variant)
+    module.register_integrator(PLUGIN, integrator_class(module))
+    _registered.add(variant)
+
+
+def register_everywhere() -> None:
+    """Makes the plugin known in the variant that is set, and in those that will be."""
+    register(mi.variant())
+    mitsuba.detail.add_variant_callback(_variant_changed)
+
+
+def _variant_changed(before: str | None, after: str | None) -> None:
+    register(after)

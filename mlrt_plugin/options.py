@@ -1,0 +1,47 @@
+"""Names of the native core's options, told apart by the step that they belong to."""
+
+from __future__ import annotations
+
+from typing import Any
+
+TRACE_OPTIONS = (
+    "traversal",
+    "entry_points",
+    "initial_tile",
+    "minimum_tile",
+    "split_factor",
+    "leaf_rejection",
+    "culling",
+)
+"""Fields of ``TraceOptions`` in ``cpp/mlrta/trace.h``."""
+
+BUILD_OPTIONS = (
+    "traversal_cost",
+    "intersection_cost",
+    "empty_bonus",
+    "clip",
+    "rule_empty_cell",
+    "rule_flat_cell",
+    "rule_area_floor",
+    "empty_cell_share",
+    "area_floor",
+    "max_depth",
+)
+"""Fields of ``BuildOptions`` in ``cpp/kdtree/builder.h``."""
+
+AOVS = ("depth", "normal", "prim")
+"""Images that can be had beside the colours."""
+
+
+def split_options(params: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Tells options of building from options of tracing.
+
+    Raises TypeError for a name that is neither.
+    """
+    unknown = sorted(set(params) - set(TRACE_OPTIONS) - set(BUILD_OPTIONS))
+    if unknown:
+        known = ", ".join((*TRACE_OPTIONS, *BUILD_OPTIONS))
+        raise TypeError(f"unknown option '{unknown[0]}': choose from {known}")
+    build = {name: value for name, value in params.items() if name in BUILD_OPTIONS}
+    trace = {name: value for name, value in params.items() if name in TRACE_OPTIONS}
+    return build, trace

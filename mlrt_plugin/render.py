@@ -1,0 +1,190 @@
+"""Renders a scene natively."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._dispatch import core
+from .errors import MlrtError, MlrtWarning
+from .options import AOVS, TRACE_OPTIONS, split_options
+from .scene_arrays import SceneArrays
+from .scene_import import SceneSource, import_scene
+from .threads import thread_count
+
+Progress = Callable[[float], object]
+"""Called with the share of the work that is done, from 0 to 1."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RenderResult:
+    """An image and how it came about.
+
+    image: (H, W, 3) float32, linear RGB.
+    aovs: by name: depth (H, W), distance along the ray in scene units; normal (H, W, 3),
+    shading normal in world space; prim (H, W), number of the face, -1 where there is none.
+    timings: seconds of load, build and render.
+    counters: what the traversal did, by name; see `cpp/base/counters.h`.
+    warnings: what was approximated or ignored.
+    """
+
+    image: npt.NDArray[np.float32]
+    aovs: dict[str, npt.NDArray[Any]]
+    timings: dict[str, float]
+    counters: dict[str, int]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class PreparedScene:
+    """A scene with its tree, ready to be rendered any number of times."""
+
+    arrays: SceneArrays
+    handle: Any
+    report: dict[str, Any]
+    timings: dict[str, float]
+
+    def render(
+        self,
+        *,
+        spp: int | None = None,
+        seed: int = 0,
+        aovs: Sequence[str] = (),
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> RenderResult:
+        """Renders the scene; `options` are fields of `TraceOptions`. See `render`."""
+        build, trace = split_options(options)
+        if build:
+            raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
+        check_aovs(aovs)
+        samples = checked_spp(self.arrays.spp if spp is None else spp)
+        own = self.arrays.lighting
+        if own.integrator == "mlrt":
+            named = {k: v for k, v in own.parameters.items() if k in TRACE_OPTIONS}
+            trace = {**named, **trace}
+        start = time.perf_counter()
+        result = core.render(
+            self.handle,
+            samples,
+            checked_seed(seed, self.arrays.base_seed),
+            trace,
+            list(aovs),
+            progress,
+        )
+        return RenderResult(
+            image=result["image"],
+            aovs=dict(result["aovs"]),
+            timings={**self.timings, "render": time.perf_counter() - start},
+            counters=dict(result["counters"]),
+            warnings=self.arrays.warnings,
+        )
+
+
+def prepare(
+    scene: SceneSource | SceneArrays,
+    *,
+    sensor: Any = 0,
+    defines: Mapping[str, object] | None = None,
+    resolution: tuple[int, int] | None = None,
+    hide_emitters: bool | None = None,
+    **options: Any,
+) -> PreparedScene:
+    """Reads a scene and builds its tree; `options` are of `BuildOptions`. See `render`."""
+    build, trace = split_options(options)
+    if trace:
+        raise TypeError(f"option '{next(iter(trace))}' is of render, not of prepare")
+    start = time.perf_counter()
+    if isinstance(scene, SceneArrays):
+        arrays = scene
+    else:
+        arrays = import_scene(scene, sensor=sensor, defines=defines, resolution=resolution)
+    loaded = time.perf_counter()
+    tree = core.KdTree(arrays.vertices, arrays.faces, **build)
+    built = time.perf_counter()
+    hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
+    handle = core.Scene(
+        tree,
+        arrays.faces if len(arrays.normals) else arrays.faces[:0],
+        arrays.normals,
+        [dataclasses.asdict(shape) for shape in arrays.shapes],
+        arrays.materials,
+        [dataclasses.asdict(emitter) for emitter in arrays.emitters],
+        dataclasses.asdict(arrays.camera),
+        dataclasses.asdict(arrays.film),
+        bool(hide),
+    )
+    timings = {"load": loaded - start, "build": built - loaded}
+    return PreparedScene(arrays, handle, dict(tree.report), timings)
+
+
+def render(
+    scene: SceneSource,
+    *,
+    spp: int | None = None,
+    seed: int = 0,
+    sensor: Any = 0,
+    threads: int | None = None,
+    aovs: Sequence[str] = (),
+    defines: Mapping[str, object] | None = None,
+    **params: Any,
+) -> RenderResult:
+    """Renders a scene.
+
+    scene: path of an XML file, dictionary as ``mi.load_dict`` takes it, or loaded
+    ``mi.Scene``. spp: samples per pixel; None takes the number of the scene's sampler.
+    seed: chooses the random numbers, as in ``mi.render``.
+    sensor: number of the sensor, in the order of declaration; of a loaded scene also a
+    sensor. threads: None takes all of Dr.Jit's pool.
+    aovs: further images, of depth, normal and prim.
+    defines: values of the file's $parameters.
+    params: resolution, a pair (width, height); hide_emitters; progress, called with the
+    share of the work that is done; and the options of `mlrt_plugin.options`, which change
+    the time that is taken but not the image.
+
+    What is approximated or ignored is warned of as MlrtWarning. Raises SceneError if the
+    scene cannot be read, UnsupportedFeature if it uses what is not rendered natively,
+    MlrtError or ValueError for other arguments that make no sense, TypeError for an
+    unknown one, and KeyboardInterrupt within 0.2 s.
+    """
+    of_scene = {k: params.pop(k) for k in ("resolution", "hide_emitters") if k in params}
+    progress = params.pop("progress", None)
+    build, trace = split_options(params)
+    check_aovs(aovs)
+    if spp is not None:
+        checked_spp(spp)
+    checked_seed(seed, 0)
+    with thread_count(threads):
+        prepared = prepare(scene, sensor=sensor, defines=defines, **of_scene, **build)
+        for message in prepared.arrays.warnings:
+            warnings.warn(message, MlrtWarning, stacklevel=2)
+        return prepared.render(spp=spp, seed=seed, aovs=aovs, progress=progress, **trace)
+
+
+def checked_spp(spp: int) -> int:
+    """The number of samples; raises MlrtError unless there is at least one."""
+    if spp < 1:
+        raise MlrtError(f"spp = {spp} is too few: at least 1 sample per pixel is needed")
+    return int(spp)
+
+
+def checked_seed(seed: int, base_seed: int) -> int:
+    """The seed of the random numbers, to which Mitsuba adds that of the sampler."""
+    if not 0 <= seed <= 0xFFFFFFFF:
+        raise MlrtError(f"seed = {seed} is out of range: it must be from 0 to 2**32 - 1")
+    return (int(seed) + base_seed) & 0xFFFFFFFF
+
+
+def check_aovs(aovs: Sequence[str]) -> None:
+    """Raises MlrtError for a name that is not in AOVS."""
+    if isinstance(aovs, str):
+        raise MlrtError(f"aovs must be a sequence of names, not the string '{aovs}'")
+    for name in aovs:
+        if name not in AOVS:
+            raise MlrtError(f"aov '{name}' does not exist: choose from {', '.join(AOVS)}")

@@ -1,0 +1,173 @@
+"""A kd-tree over triangles for rays in NumPy or Dr.Jit arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import drjit as dr
+import numpy as np
+import numpy.typing as npt
+
+from ._dispatch import core
+from .options import BUILD_OPTIONS, TRACE_OPTIONS
+
+
+class Hits(NamedTuple):
+    """Nearest hits of N rays.
+
+    t: (N,) float32, in units of the ray's direction; inf for a miss.
+    primitive: (N,) int32, the number of the face; -1 for a miss.
+    u, v: (N,) float32, weights of the face's second and third vertex at the hit; 0 for a
+    miss.
+    """
+
+    t: npt.NDArray[np.float32]
+    primitive: npt.NDArray[np.int32]
+    u: npt.NDArray[np.float32]
+    v: npt.NDArray[np.float32]
+
+
+class KdTree:
+    """A kd-tree over the triangles of a mesh.
+
+    Coordinates are kept in single precision: wider ones are rounded to it. Of hits at the
+    same distance the one on the face of the lowest number counts, so that results do not
+    depend on the options. Faces without area and faces with a vertex that is not finite
+    are never hit. Queries release the GIL and use all threads of Dr.Jit's pool.
+    """
+
+    def __init__(
+        self, vertices: npt.ArrayLike, faces: npt.ArrayLike, **options: Any
+    ) -> None:
+        """Builds the tree.
+
+        vertices: (V, 3) coordinates.
+        faces: (F, 3) integers, numbers of vertices.
+        options: fields of `BuildOptions`, see `mlrt_plugin.options.BUILD_OPTIONS`.
+
+        Raises ValueError for arrays of another shape or type, and for a face that refers
+        to a vertex that does not exist; TypeError for an unknown option.
+        """
+        unknown = sorted(set(options) - set(BUILD_OPTIONS))
+        if unknown:
+            raise TypeError(
+                f"unknown option '{unknown[0]}': choose from {', '.join(BUILD_OPTIONS)}"
+            )
+        points = triples(vertices, "vertices")
+        corners = indices(faces, len(points))
+        self._tree = core.KdTree(points, corners, **options)
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What the builder did: numbers of nodes, references and splits, cost, seconds."""
+        return dict(self._tree.report)
+
+    def closest_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> Hits:
+        """The nearest hit of each ray {origin + t * direction, t_min < t <= t_max}.
+
+        origins, directions: (N, 3); directions need not have unit length. Rays that follow
+        one another should be near one another in space.
+        t_min, t_max: numbers or (N,).
+        options: fields of `TraceOptions`, see `mlrt_plugin.options.TRACE_OPTIONS`; they
+        change the time that is taken, never the result.
+
+        A ray with a component that is not finite, or with a direction of zero length,
+        misses. Raises ValueError for arrays of another shape or type.
+        """
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        return Hits(*self._tree.closest_hit(*rays, trace_options(options)))
+
+    def any_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> npt.NDArray[np.bool_]:
+        """Whether anything lies on each ray: (N,) bool. Arguments are those of
+        `closest_hit`."""
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        occluded: npt.NDArray[np.bool_] = self._tree.any_hit(*rays, trace_options(options))
+        return occluded
+
+
+def trace_options(options: dict[str, Any]) -> dict[str, Any]:
+    unknown = sorted(set(options) - set(TRACE_OPTIONS))
+    if unknown:
+        raise TypeError(
+            f"unknown option '{unknown[0]}': choose from {', '.join(TRACE_OPTIONS)}"
+        )
+    return options
+
+
+def as_numpy(values: Any) -> npt.NDArray[Any]:
+    """An array of NumPy; nested Dr.Jit arrays such as ``mi.Point3f`` come as (N, 3)."""
+    array = np.asarray(values)
+    if dr.is_array_v(values) and not dr.is_tensor_v(values) and dr.depth_v(values) == 2:
+        return array.T
+    return array
+
+
+def single(array: npt.NDArray[Any], name: str) -> npt.NDArray[np.float32]:
+    """The numbers of an array in single precision, contiguous."""
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{name} must hold real numbers, not {array.dtype}")
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(array, np.float32)
+
+
+def triples(values: Any, name: str) -> npt.NDArray[np.float32]:
+    """Points or vectors as (N, 3) float32."""
+    array = as_numpy(values)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must have the shape (N, 3), not {array.shape}")
+    return single(array, name)
+
+
+def indices(values: Any, vertex_count: int) -> npt.NDArray[np.uint32]:
+    """Faces as (F, 3) uint32."""
+    array = as_numpy(values)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"faces must have the shape (F, 3), not {array.shape}")
+    if array.dtype.kind not in "iu":
+        raise ValueError(f"faces must hold integers, not {array.dtype}")
+    if array.size:
+        low, high = int(array.min()), int(array.max())
+        if low < 0 or high >= vertex_count:
+            worst = low if low < 0 else high
+            raise ValueError(
+                f"faces refer to vertex {worst}, but there are {vertex_count} vertices"
+            )
+    return np.ascontiguousarray(array, np.uint32)
+
+
+def ray_arrays(
+    origins: Any, directions: Any, t_min: Any, t_max: Any
+) -> tuple[npt.NDArray[np.float32], ...]:
+    """Rays as the native core takes them: (N, 3), (N, 3), (N,) and (N,) float32."""
+    start, along = triples(origins, "origins"), triples(directions, "directions")
+    if start.shape != along.shape:
+        raise ValueError(
+            f"origins and directions must have the same shape, not {start.shape} and "
+            f"{along.shape}"
+        )
+    bounds = []
+    for values, name in ((t_min, "t_min"), (t_max, "t_max")):
+        array = as_numpy(values)
+        if array.shape not in ((), (1,), (len(start),)):
+            raise ValueError(
+                f"{name} must be a number or have the shape ({len(start)},), not "
+                f"{array.shape}"
+            )
+        bounds.append(
+            np.ascontiguousarray(np.broadcast_to(single(array, name), (len(start),)))
+        )
+    return start, along, bounds[0], bounds[1]
