@@ -41,7 +41,10 @@ REMEDIES = (
     ("missing version", 'add version="3.0.0" to the <scene>'),
     ("Parsing of XML", "mend the XML there"),
     (r"read \d+ out of", "the mesh file is truncated, export it anew"),
-    ("past the end of the stream|inflate", "the mesh file is damaged, export it anew"),
+    (
+        "past the end of the stream|inflate|bytes required",
+        "the mesh file is damaged, export it anew",
+    ),
     ("I/O error|invalid PLY|invalid file format|value for field", "export the file anew"),
 )
 """What to do about an error of Mitsuba, by what its message says; the first that fits

@@ -63,6 +63,11 @@ def import_scene(
             raise SceneError(
                 "parameters cannot be defined for a scene that is already loaded"
             )
+        if not scene.variant_name().endswith("_rgb"):
+            raise SceneError(
+                f"the scene is loaded in the variant {scene.variant_name()}: load it in an RGB "
+                "variant"
+            )
         sensors, sensor = sensors_of(scene, sensor)
         root = elements.from_scene(scene, sensors)
         names: dict[str, Element] = {}

@@ -1,0 +1,195 @@
+"""Scenes that cannot be rendered: one sentence each, and never a crash."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mitsuba as mi
+import pytest
+import scene_files
+
+from mlrt_plugin import MlrtError, SceneError, UnsupportedFeature, import_scene
+
+SceneFile = Callable[..., Path]
+
+
+def message_of(error: pytest.ExceptionInfo[MlrtError]) -> str:
+    text = str(error.value)
+    assert "\n" not in text
+    assert "\x1b" not in text
+    assert ".cpp" not in text
+    return text
+
+
+def film(width: object, height: object) -> dict[str, str]:
+    text = scene_files.SENSOR.replace('value="16"', f'value="{width}"')
+    return {"sensor": text.replace('value="12"', f'value="{height}"')}
+
+
+def moved_floor(transform: str) -> dict[str, str]:
+    return {
+        "shapes": '<shape type="rectangle" id="floor"><transform name="to_world">'
+        f"{transform}</transform></shape>"
+    }
+
+
+SCENES = {
+    "no shapes": ({"shapes": ""}, "no shapes"),
+    "no emitter": ({"emitters": ""}, "no emitter"),
+    "no sensor": ({"sensor": ""}, "no sensor"),
+    "unknown plugin": ({"shapes": '<shape type="nonsense" id="x"/>'}, "'nonsense'.*'x'"),
+    "unknown element": ({"extra": "<foo/>"}, "<foo>"),
+    "unclosed element": ({"extra": '<shape type="cube">'}, "line"),
+    "unknown property": (
+        {"shapes": '<shape type="cube"><float name="size" value="1"/></shape>'},
+        "size",
+    ),
+    "bad number": (
+        {"shapes": '<shape type="cube"><float name="size" value="big"/></shape>'},
+        "big",
+    ),
+    "bad reference": ({"shapes": '<shape type="cube"><ref id="nope"/></shape>'}, "nope"),
+    "undefined parameter": ({"extra": '<bsdf type="$kind"/>'}, "kind"),
+    "film without width": (film(0, 12), "width = 0"),
+    "film of negative height": (film(16, -5), "height = -5"),
+    "flattening": (moved_floor('<scale x="0"/>'), "'floor'.*singular"),
+    "not a number": (moved_floor('<translate x="nan"/>'), "'floor'.*NaN"),
+    "infinite": (moved_floor('<scale value="inf"/>'), "'floor'.*NaN or infinite"),
+    "overflow": (moved_floor('<scale value="1e38"/><scale value="1e3"/>'), "'floor'"),
+    "scaling camera": (
+        {"sensor": scene_files.SENSOR.replace("<lookat", '<scale x="2"/><lookat')},
+        "[Ss]cale",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_bad_scenes(scene_file: SceneFile, name: str) -> None:
+    parts, expected = SCENES[name]
+    with pytest.raises(SceneError, match=expected) as caught:
+        import_scene(scene_file(**parts))
+    message_of(caught)
+
+
+PLY = scene_files.ply_bytes()
+NAN = float("nan")
+MESHES = {
+    "missing.ply": (None, "missing.ply"),
+    "missing.obj": (None, "missing.obj"),
+    "missing.serialized": (None, "missing.serialized"),
+    "empty.ply": (b"", "empty.ply"),
+    "empty.obj": (b"", "empty.obj"),
+    "empty.serialized": (b"", "empty.serialized"),
+    "header.ply": (PLY[:60], "header.ply"),
+    "truncated.ply": (PLY[:-5], "truncated.ply"),
+    "short.ply": (scene_files.ply_bytes(declared_faces=10**6), "short.ply"),
+    "text.ply": (scene_files.ply_bytes(text=True)[:-10], "text.ply"),
+    "nan.ply": (scene_files.ply_bytes([(NAN, 0, 0), *scene_files.SQUARE[1:]]), "nan.ply"),
+    "quads.ply": (scene_files.ply_bytes(faces=[(0, 1, 3, 2)]), "quads.ply"),
+    "index.ply": (scene_files.ply_bytes(faces=[(0, 1, 99999999)]), "vertex 99999999 of 4"),
+    "negative.ply": (scene_files.ply_bytes(faces=[(0, 1, -7)]), "vertex -7 of 4"),
+    "textindex.ply": (scene_files.ply_bytes(faces=[(0, 1, 4)], text=True), "vertex 4 of 4"),
+    "index.serialized": (
+        scene_files.serialized_bytes(faces=[(0, 1, 88888888)]),
+        "vertex 88888888 of 4",
+    ),
+    "truncated.serialized": (scene_files.serialized_bytes()[:34], "truncated.serialized"),
+    "index.obj": (scene_files.OBJ.replace("f 1 2 3", "f 1 2 7").encode(), "vertex 7"),
+    "truncated.obj": (scene_files.OBJ[:-4].encode(), "'mesh'.*no faces"),
+    "vertices.obj": (b"v 0 0 0\n", "no faces"),
+    "nan.obj": (scene_files.OBJ.replace("1 0 0", "nan 0 0").encode(), "nan.obj"),
+    "garbage.obj": (bytes(range(256)), "mesh|garbage"),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_bad_meshes(scene_file: SceneFile, tmp_path: Path, name: str) -> None:
+    content, expected = MESHES[name]
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SceneError, match=expected) as caught:
+        import_scene(scene_file(shapes=scene_files.mesh_shape(name)))
+    message_of(caught)
+
+
+def test_mesh_in_memory_with_bad_vertices(scalar_variant: None) -> None:
+    mesh = mi.Mesh("blob", 3, 1)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = [0, 0, 0, 1, NAN, 0, 0, 1, float("inf")]
+    parameters["faces"] = [0, 1, 2]
+    with pytest.raises(SceneError, match="2 of 3 vertices with NaN") as caught:
+        import_scene(scene_files.scene_dict(floor=mesh))
+    message_of(caught)
+
+
+@pytest.mark.parametrize("text", ["", "not XML", '<scene version="3.0.0">', "\0\1\2"])
+def test_files_that_are_no_scene(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=r"scene\.xml.*line") as caught:
+        import_scene(path)
+    message_of(caught)
+
+
+def test_files_that_hold_something_else(tmp_path: Path) -> None:
+    path = tmp_path / "scene.xml"
+    path.write_text('<shape type="cube" version="3.0.0"/>')
+    with pytest.raises(SceneError, match="root must be a scene"):
+        import_scene(path)
+    with pytest.raises(SceneError, match="is a folder"):
+        import_scene(tmp_path)
+    with pytest.raises(SceneError, match=r"absent\.xml' does not exist"):
+        import_scene(tmp_path / "absent.xml")
+    with pytest.raises(TypeError, match="not int"):
+        import_scene(3)
+
+
+def test_arguments(scene_file: SceneFile) -> None:
+    path = scene_file()
+    with pytest.raises(SceneError, match=r"unused.*other=3"):
+        import_scene(path, defines={"other": 3})
+    with pytest.raises(SceneError, match="no sensor 1: it has 1"):
+        import_scene(path, sensor=1)
+    with pytest.raises(SceneError, match="no sensor -1"):
+        import_scene(path, sensor=-1)
+    with pytest.raises(SceneError, match="0x8 is too small"):
+        import_scene(path, resolution=(0, 8))
+    with pytest.raises(SceneError, match="dictionary"):
+        import_scene(scene_files.scene_dict(), defines={"a": 1})
+
+
+def test_crop_keeps_the_resolution(scene_file: SceneFile) -> None:
+    crop = '<integer name="crop_width" value="4"/>'
+    path = scene_file(sensor=scene_files.SENSOR.replace("<rfilter", crop + "<rfilter"))
+    with pytest.raises(SceneError, match="remove the crop"):
+        import_scene(path, resolution=(8, 8))
+
+
+def test_spectral_objects_are_refused(scalar_variant: None) -> None:
+    mi.set_variant("scalar_spectral")
+    try:
+        bsdf = mi.load_dict({"type": "diffuse"})
+        scene = mi.load_dict(scene_files.scene_dict())
+    finally:
+        mi.set_variant("scalar_rgb")
+    with pytest.raises(SceneError, match="scalar_spectral"):
+        import_scene(scene_files.scene_dict(floor={"type": "rectangle", "bsdf": bsdf}))
+    with pytest.raises(SceneError, match="scalar_spectral"):
+        import_scene(scene)
+
+
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        '<integrator type="direct"><integer name="emitter_samples" value="0"/></integrator>',
+        '<integrator type="path"><integer name="max_depth" value="1"/></integrator>',
+        '<integrator type="mlrt"><integer name="bsdf_samples" value="1"/></integrator>',
+        '<integrator type="mlrt"><integer name="samples" value="1"/></integrator>',
+    ],
+)
+def test_integrators_that_ask_for_something_else(
+    scene_file: SceneFile, integrator: str
+) -> None:
+    with pytest.raises(UnsupportedFeature, match="integrator '"):
+        import_scene(scene_file(integrator=integrator))
