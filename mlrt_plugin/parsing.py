@@ -7,7 +7,7 @@ entry points: the variant that the caller has set, if any, stays set.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +68,21 @@ class ParsedScene:
         return self.elements[0]
 
 
-def reported(action: Callable[[], T], name: str) -> T:
+def unnamed_file(message: str, elements: Sequence[Element]) -> str:
+    """The file of the element that a message is about, if the message does not name it."""
+    for element in elements:
+        filename = str(element.properties.get("filename", ""))
+        line, _, column = element.where.rpartition(" line ")[2].partition(":")
+        if (
+            filename
+            and f"(line {line}, col {column})" in message
+            and filename not in message
+        ):
+            return f" in '{filename}'"
+    return ""
+
+
+def reported(action: Callable[[], T], name: str, elements: Sequence[Element] = ()) -> T:
     """Runs a step of Mitsuba; its errors become a SceneError of one sentence."""
     try:
         return action()
@@ -77,6 +91,7 @@ def reported(action: Callable[[], T], name: str) -> T:
         remedy = next((r for p, r in REMEDIES if re.search(p, message)), "mend the scene")
         if name not in message:
             message = f"scene '{name}': {message}"
+        message += unnamed_file(message, elements)
         raise SceneError(f"{message}; {remedy}") from error
 
 
@@ -211,6 +226,8 @@ def instantiate(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
         by_id[f"n{number}"] = element
     with resolving_from(parsed.folder):
         scene = reported(
-            lambda: mi.parser.instantiate(parsed.config, parsed.state), parsed.name
+            lambda: mi.parser.instantiate(parsed.config, parsed.state),
+            parsed.name,
+            parsed.elements,
         )
     return scene, by_id

@@ -65,8 +65,8 @@ def import_scene(
             )
         if not scene.variant_name().endswith("_rgb"):
             raise SceneError(
-                f"the scene is loaded in the variant {scene.variant_name()}: load it in an RGB "
-                "variant"
+                f"the scene is loaded in the variant {scene.variant_name()}: load it in an "
+                "RGB variant"
             )
         sensors, sensor = sensors_of(scene, sensor)
         root = elements.from_scene(scene, sensors)

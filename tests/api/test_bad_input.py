@@ -180,16 +180,19 @@ def test_spectral_objects_are_refused(scalar_variant: None) -> None:
 
 
 @pytest.mark.parametrize(
-    "integrator",
+    ("plugin", "name", "value"),
     [
-        '<integrator type="direct"><integer name="emitter_samples" value="0"/></integrator>',
-        '<integrator type="path"><integer name="max_depth" value="1"/></integrator>',
-        '<integrator type="mlrt"><integer name="bsdf_samples" value="1"/></integrator>',
-        '<integrator type="mlrt"><integer name="samples" value="1"/></integrator>',
+        ("direct", "emitter_samples", 0),
+        ("path", "max_depth", 1),
+        ("mlrt", "bsdf_samples", 1),
+        ("mlrt", "samples", 1),
     ],
 )
 def test_integrators_that_ask_for_something_else(
-    scene_file: SceneFile, integrator: str
+    scene_file: SceneFile, plugin: str, name: str, value: int
 ) -> None:
+    integrator = (
+        f'<integrator type="{plugin}"><integer name="{name}" value="{value}"/></integrator>'
+    )
     with pytest.raises(UnsupportedFeature, match="integrator '"):
         import_scene(scene_file(integrator=integrator))
