@@ -98,7 +98,7 @@ std::optional<Candidate> covered_plane(const CellContents &contents, const Box3f
             group.count;
         candidate.cost = SplitCost(options, cell, group.axis)(
             group.position, candidate.lower_count, candidate.upper_count);
-        if (!best || candidate.cost < best->cost)
+        if (!best || is_cheaper(candidate.cost, best->cost))
             best = candidate;
     }
     return best;

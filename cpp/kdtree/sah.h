@@ -27,6 +27,15 @@ inline Box3f upper_part(Box3f cell, int axis, float position) {
     return cell;
 }
 
+// Costs that differ by less are equal, and the plane found first is kept. Planes with as
+// many references on the one side as on the other all cost the same: rounding must not
+// choose.
+constexpr double COST_TIE = 0x1p-40;
+
+inline bool is_cheaper(double cost, double than) {
+    return cost < than * (1 - COST_TIE);
+}
+
 // Expected costs of a ray that enters a cell of positive area, which is split across one
 // axis:
 //     C_split = K_T + K_I (A_L / A N_L + A_R / A N_R)   C_leaf = K_I N

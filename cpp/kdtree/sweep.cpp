@@ -22,7 +22,7 @@ void sweep_axis(const CellContents &contents, const Box3f &cell,
     const auto offer = [&](float position, uint64_t lower_count, uint64_t upper_count,
                            bool planar_below) {
         const double cost = split_cost(position, lower_count, upper_count);
-        if (cost < best.cost)
+        if (is_cheaper(cost, best.cost))
             best = {cost, position, lower_count, upper_count, planar_below, axis};
     };
 
