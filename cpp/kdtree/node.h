@@ -7,8 +7,8 @@
 
 namespace mlrt {
 
-// An inner node holds its split plane {x[axis] = split} and the index of its lower child; the
-// upper child follows it. A leaf holds a range of the tree's list of references.
+// An inner node holds its split plane {x[axis] = split} and the index of its lower child;
+// the upper child follows it. A leaf holds a range of the tree's list of references.
 //
 // info, from the low bit: 2 bits axis (3 marks a leaf), then
 //   inner node: 30 bits index of the lower child

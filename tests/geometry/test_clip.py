@@ -30,7 +30,10 @@ def assert_encloses(
     triangle: FloatArray, lo: FloatArray, hi: FloatArray, ulps: float | None = 1.0
 ) -> bool:
     """Asserts that clipping loses nothing and, if ``ulps`` is given, that its bounds exceed
-    the exact ones by no more than so many float32 steps. Returns whether anything is left."""
+    the exact ones by no more than so many float32 steps.
+
+    Returns whether anything is left.
+    """
     message = f"seed {SEED}: {triangle.tolist()} in {lo.tolist()} .. {hi.tolist()}"
     part = exact_part(triangle, lo, hi)
     found = clip(triangle, lo, hi)

@@ -26,8 +26,8 @@ def is_reachable(tree: BuiltTree, node: int, triangle: int, part: exact.Polygon)
     """Whether each point of the part, which lies in the node's cell, is in a leaf that
     references the triangle.
 
-    What reaches below a plane must be found below, above likewise. What lies in the plane may
-    be on either side, the same for all of it.
+    What reaches below a plane must be found below, above likewise. What lies in the plane
+    may be on either side, the same for all of it.
     """
     if tree.is_leaf(node):
         return triangle in tree.referenced(node)

@@ -70,7 +70,7 @@ def wall_in_a_box(position: float, wall: FloatArray) -> FloatArray:
 
 
 def below_root(tree: BuiltTree) -> list[set[int]]:
-    """Returns all that is referenced on the lower and the upper side of the root's plane."""
+    """Returns what is referenced on the lower and the upper side of the root's plane."""
 
     def held(node: int) -> set[int]:
         if tree.is_leaf(node):
