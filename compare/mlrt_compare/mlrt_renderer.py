@@ -1,0 +1,51 @@
+"""The MLRT side."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+import mlrt_plugin
+from mlrt_plugin.render import prepare
+
+from .settings import Settings
+
+
+class MlrtRenderer:
+    """A scene loaded by MLRT, to be rendered as often as one likes.
+
+    Raises MlrtError, one sentence, if the scene cannot be rendered.
+    """
+
+    name = f"MLRT {mlrt_plugin.__version__} {mlrt_plugin.isa}"
+
+    def __init__(self, settings: Settings) -> None:
+        start = time.perf_counter()
+        self._prepared = prepare(
+            settings.scene,
+            sensor=settings.sensor,
+            defines=settings.defines,
+            resolution=settings.resolution,
+        )
+        self.build = self._prepared.timings["build"]
+        self.load = time.perf_counter() - start - self.build
+        self.warnings = self._prepared.arrays.warnings
+        self.spp = self._prepared.arrays.spp if settings.spp is None else settings.spp
+        self._seed = settings.seed
+        self._image: NDArray[np.float32] | None = None
+
+    def frame(self) -> float:
+        """Renders a frame and returns the seconds that it took."""
+        start = time.perf_counter()
+        self._image = self._prepared.render(spp=self.spp, seed=self._seed).image
+        return time.perf_counter() - start
+
+    @property
+    def image(self) -> NDArray[np.float32]:
+        """The last frame, (H, W, 3) of linear radiance."""
+        if self._image is None:
+            self.frame()
+        assert self._image is not None
+        return self._image

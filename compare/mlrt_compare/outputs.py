@@ -1,0 +1,38 @@
+"""Writes the images of a comparison, all of them or none."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+from PIL import Image as Pillow
+
+from mlrt_plugin.image_files import write_image
+
+from .report import side_by_side
+from .run import Comparison
+
+
+def write_outputs(comparison: Comparison, folder: Path) -> list[Path]:
+    """Writes STEM-mlrt.exr, STEM-mitsuba.exr and STEM-comparison.png; returns their paths.
+
+    Makes ``folder`` if its parent exists. Raises OSError if something cannot be written;
+    then no image is left behind.
+    """
+    folder.mkdir(exist_ok=True)
+    stem = comparison.settings.scene.stem
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".mlrt-compare-") as temporary:
+        unfinished = Path(temporary)
+        names = [f"{stem}-mlrt.exr", f"{stem}-mitsuba.exr", f"{stem}-comparison.png"]
+        write_image(unfinished / names[0], comparison.mlrt.image)
+        write_image(unfinished / names[1], comparison.mitsuba.image)
+        if comparison.verdict.difference is not None:
+            picture = side_by_side(
+                comparison.mlrt.image,
+                comparison.mitsuba.image,
+                (comparison.mlrt.name, comparison.mitsuba.name),
+            )
+            Pillow.fromarray(picture).save(unfinished / names[2])
+        else:
+            names.pop()
+        return [(unfinished / name).replace(folder / name) for name in names]
