@@ -60,11 +60,11 @@ def count_rule(node: Node, rule: str) -> int:
 
 
 SCENES = {
-    "soup": lambda rng: soup(rng, 90, 0.15),
-    "sparse": lambda rng: soup(rng, 120, 0.02),
+    "soup": lambda rng: soup(rng, 70, 0.15),
+    "sparse": lambda rng: soup(rng, 70, 0.02),
     "dense": lambda rng: soup(rng, 40, 0.6),
     "rooms": lambda rng: rooms(rng, 3),
-    "mixed": lambda rng: np.concatenate([rooms(rng, 1), soup(rng, 40, 0.05)]),
+    "mixed": lambda rng: np.concatenate([rooms(rng, 1), soup(rng, 30, 0.05)]),
 }
 SWITCHES: list[dict[str, Any]] = [
     {},
