@@ -6,16 +6,16 @@
 namespace mlrt {
 
 struct Counters {
-    uint64_t rays = 0;              // active rays
-    uint64_t packets = 0;           // groups of up to 16 rays that were traced
-    uint64_t entry_steps = 0;       // nodes visited by entry point searches, leaves included
-    uint64_t traversal_steps = 0;   // nodes visited by packets, leaves included
-    uint64_t leaf_visits = 0;       // of which leaves
-    uint64_t triangle_tests = 0;    // packet against triangle
-    uint64_t double_tests = 0;      // ray against triangle that single precision left undecided
-    uint64_t exact_tests = 0;       // ... and that double precision left undecided
-    uint64_t tiles = 0;             // tiles for which an entry point was searched
-    uint64_t missed_tiles = 0;      // tiles that no leaf can hold a hit for
+    uint64_t rays = 0;            // active rays
+    uint64_t packets = 0;         // groups of up to 16 rays that were traced
+    uint64_t entry_steps = 0;     // nodes visited by entry point searches, leaves included
+    uint64_t traversal_steps = 0; // nodes visited by packets, leaves included
+    uint64_t leaf_visits = 0;     // of which leaves
+    uint64_t triangle_tests = 0;  // packet against triangle
+    uint64_t double_tests = 0; // ray against triangle that single precision left undecided
+    uint64_t exact_tests = 0;  // ... and that double precision left undecided
+    uint64_t tiles = 0;        // tiles for which an entry point was searched
+    uint64_t missed_tiles = 0; // tiles that no leaf can hold a hit for
 
     Counters &operator+=(const Counters &other) {
         rays += other.rays;

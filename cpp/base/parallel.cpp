@@ -2,11 +2,10 @@
 
 #include "base/simd.h"
 
-#include <nanothread/nanothread.h>
-
 #include <atomic>
 #include <exception>
 #include <mutex>
+#include <nanothread/nanothread.h>
 
 namespace mlrt {
 
@@ -58,6 +57,8 @@ bool parallel_for(uint32_t count, const std::function<void(uint32_t)> &body,
     return !job.stop.load(std::memory_order_relaxed);
 }
 
-uint32_t thread_count() { return pool_size(); }
+uint32_t thread_count() {
+    return pool_size();
+}
 
 } // namespace mlrt

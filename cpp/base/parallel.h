@@ -1,5 +1,5 @@
-// Parallel loops over the thread pool that Mitsuba uses too, so that the two never oversubscribe.
-// The only place that knows nanothread.
+// Parallel loops over the thread pool that Mitsuba uses too, so that the two never
+// oversubscribe. The only place that knows nanothread.
 #pragma once
 
 #include <cstdint>
@@ -7,11 +7,11 @@
 
 namespace mlrt {
 
-// Calls body(i) once for each i in [0, count), from any thread and in any order. Denormal numbers
-// are kept in body, whatever mode the pool's threads are in.
+// Calls body(i) once for each i in [0, count), from any thread and in any order. Denormal
+// numbers are kept in body, whatever mode the pool's threads are in.
 //
-// `cancelled`, if given, is asked now and then by the calling thread only; once it returns true
-// the calls that have not begun are left out and the function returns false.
+// `cancelled`, if given, is asked now and then by the calling thread only; once it returns
+// true the calls that have not begun are left out and the function returns false.
 bool parallel_for(uint32_t count, const std::function<void(uint32_t)> &body,
                   const std::function<bool()> &cancelled = {});
 

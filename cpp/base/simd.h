@@ -1,45 +1,144 @@
-// The vocabulary of vector code: the only place that knows Dr.Jit and the width of a register.
+// The vocabulary of vector code: the only place that knows Dr.Jit and the width of a
+// register.
 //
 // A packet is 16 lanes on every processor; narrower instruction sets run it in two or four
-// halves. Arithmetic is plain IEEE: the same operations in the same order give the same bits on
-// all of them. Use true division: dr::rcp differs between instruction sets.
+// parts. Arithmetic is plain IEEE: the same operations in the same order give the same bits
+// on all of them. Division is true division: approximate reciprocals differ between
+// processors.
+//
+// Everything here works for scalars too, so that a formula is written once for both.
 #pragma once
 
-#include <drjit/packet.h>
+#include "base/vec.h"
 
 #include <cstdint>
+#include <drjit/packet.h>
+#include <type_traits>
 
 namespace mlrt {
 
 inline constexpr uint32_t PACKET_WIDTH = 16;
 
-template <uint32_t W>
-using FloatPacket = drjit::Packet<float, W>;
-template <uint32_t W>
-using DoublePacket = drjit::Packet<double, W>;
-template <uint32_t W>
-using UIntPacket = drjit::Packet<uint32_t, W>;
+using FloatPacket = drjit::Packet<float, PACKET_WIDTH>;
+using DoublePacket = drjit::Packet<double, PACKET_WIDTH>;
+using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
+
+// What comparing two T gives: bool, or one truth value a lane.
+template <typename T>
+using MaskOf = drjit::mask_t<T>;
 
 // One bit a lane, lane 0 lowest.
-using LaneMask = uint32_t;
+using LaneBits = uint32_t;
+inline constexpr LaneBits ALL_LANES = (1u << PACKET_WIDTH) - 1;
+
+template <typename T>
+T absolute(const T &a) {
+    return drjit::abs(a);
+}
+
+template <typename T>
+T select(const MaskOf<T> &mask, const T &if_true, const T &if_false) {
+    return drjit::select(mask, if_true, if_false);
+}
+
+// The lesser (greater) of both; the second operand where they are unordered, as x86 does it
+// in one instruction.
+template <typename T>
+T minimum(const T &a, const T &b) {
+    if constexpr (std::is_arithmetic_v<T>) {
+        return a < b ? a : b;
+#if defined(__AVX512F__)
+    } else if constexpr (std::is_same_v<T, FloatPacket>) {
+        return T(_mm512_min_ps(a.m, b.m));
+#elif defined(__AVX__)
+    } else if constexpr (std::is_same_v<T, FloatPacket>) {
+        using Half = std::decay_t<decltype(drjit::low(a))>;
+        return T(Half(_mm256_min_ps(drjit::low(a).m, drjit::low(b).m)),
+                 Half(_mm256_min_ps(drjit::high(a).m, drjit::high(b).m)));
+#endif
+    } else {
+        return drjit::select(a < b, a, b);
+    }
+}
+
+template <typename T>
+T maximum(const T &a, const T &b) {
+    if constexpr (std::is_arithmetic_v<T>) {
+        return a > b ? a : b;
+#if defined(__AVX512F__)
+    } else if constexpr (std::is_same_v<T, FloatPacket>) {
+        return T(_mm512_max_ps(a.m, b.m));
+#elif defined(__AVX__)
+    } else if constexpr (std::is_same_v<T, FloatPacket>) {
+        using Half = std::decay_t<decltype(drjit::low(a))>;
+        return T(Half(_mm256_max_ps(drjit::low(a).m, drjit::low(b).m)),
+                 Half(_mm256_max_ps(drjit::high(a).m, drjit::high(b).m)));
+#endif
+    } else {
+        return drjit::select(a > b, a, b);
+    }
+}
+
+// Least and greatest lane. Lanes must be ordered (no NaN).
+inline float least_lane(const FloatPacket &a) {
+    return drjit::min(a);
+}
+inline float greatest_lane(const FloatPacket &a) {
+    return drjit::max(a);
+}
+
+inline bool any_lane(bool mask) {
+    return mask;
+}
+template <typename Mask>
+bool any_lane(const Mask &mask) {
+    return drjit::any(mask);
+}
 
 template <typename Mask>
-LaneMask to_bits(const Mask &mask) {
-    if constexpr (requires { mask.bitmask_(); }) {
-        return LaneMask(mask.bitmask_());
+LaneBits to_bits(const Mask &mask) {
+    if constexpr (requires { mask.k; }) {
+        return LaneBits(mask.k);
+    } else if constexpr (requires { mask.bitmask_(); }) {
+        return LaneBits(mask.bitmask_());
     } else {
         constexpr uint32_t half = uint32_t(drjit::size_v<decltype(drjit::low(mask))>);
         return to_bits(drjit::low(mask)) | (to_bits(drjit::high(mask)) << half);
     }
 }
 
+// The lanes whose bit is set, as a mask over T.
+template <typename T>
+MaskOf<T> from_bits(LaneBits bits) {
+#if defined(__AVX512F__)
+    if constexpr (std::is_same_v<T, FloatPacket> || std::is_same_v<T, UIntPacket>)
+        return MaskOf<T>::from_k(uint16_t(bits));
+#endif
+    const UIntPacket lane_bit = UIntPacket(1u) << drjit::arange<UIntPacket>();
+    return MaskOf<T>((UIntPacket(bits) & lane_bit) != 0u);
+}
+
 // Calls visit(lane) for each set bit, lowest first.
 template <typename Visit>
-void for_each_lane(LaneMask bits, Visit &&visit) {
+void for_each_lane(LaneBits bits, Visit &&visit) {
     while (bits) {
-        visit(__builtin_ctz(bits));
+        visit(uint32_t(__builtin_ctz(bits)));
         bits &= bits - 1;
     }
+}
+
+template <typename Packet, typename Value>
+Packet load(const Value *values) {
+    return drjit::load<Packet>(values);
+}
+
+template <typename Packet, typename Value>
+void store(Value *values, const Packet &packet) {
+    drjit::store(values, packet);
+}
+
+inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
+    return {DoublePacket(v.x), DoublePacket(v.y), DoublePacket(v.z)};
 }
 
 // Keeps denormal numbers while it lives: Dr.Jit's threads flush them to zero.

@@ -85,7 +85,8 @@ bool is_finite(Vec3<T> a) {
 struct Box3f {
     Vec3f lo{std::numeric_limits<float>::infinity(), std::numeric_limits<float>::infinity(),
              std::numeric_limits<float>::infinity()};
-    Vec3f hi{-std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+    Vec3f hi{-std::numeric_limits<float>::infinity(),
+             -std::numeric_limits<float>::infinity(),
              -std::numeric_limits<float>::infinity()};
 
     constexpr bool empty() const { return !(lo.x <= hi.x && lo.y <= hi.y && lo.z <= hi.z); }

@@ -7,5 +7,6 @@ namespace mlrt {
 
 void bind_kdtree_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);
+void bind_tree(nanobind::module_ &m);
 
 } // namespace mlrt

@@ -5,9 +5,11 @@ namespace mlrt {
 
 namespace {
 
-// a * b - c, which differs from its fused evaluation for suitable arguments: a test feeds it
-// such arguments to prove that the compiler did not contract it.
-float multiply_subtract(float a, float b, float c) { return a * b - c; }
+// a * b - c, which differs from its fused evaluation for suitable arguments: a test feeds
+// it such arguments to prove that the compiler did not contract it.
+float multiply_subtract(float a, float b, float c) {
+    return a * b - c;
+}
 
 } // namespace
 

@@ -1,9 +1,8 @@
-// Which of the modules beside this one may be loaded on this processor. Built for the oldest
-// processor of the family, so that importing it is always safe.
+// Which of the modules beside this one may be loaded on this processor. Built for the
+// oldest processor of the family, so that importing it is always safe.
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
-
 #include <string>
 #include <vector>
 
@@ -28,6 +27,7 @@ std::vector<std::string> supported_isas() {
 
 NB_MODULE(_cpu, m) {
     m.def("supported_isas", &supported_isas,
-          "Names of the instruction sets that this processor and its operating system support, "
+          "Names of the instruction sets that this processor and its operating system "
+          "support, "
           "the widest first.");
 }

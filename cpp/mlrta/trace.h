@@ -3,37 +3,47 @@
 
 #include "base/counters.h"
 #include "kdtree/tree.h"
+#include "mlrta/beam.h"
 #include "traverse/ray_group.h"
 
 #include <cstdint>
 
 namespace mlrt {
 
-// How rays are taken through the tree (mlrta component names in brackets). All of them return
-// the same hits, bit for bit.
+// How rays are taken through the tree (mlrta component names in brackets). All of them
+// return the same hits, bit for bit.
 enum class Traversal : uint32_t {
     brute_force, // X0: every triangle, no tree
     single,      // X1: one ray at a time
     packet,      // X2: 16 rays at a time, an interval each
-    interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005, section 3.3)
+    interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005,
+                 // section 3.3)
 };
 
-enum class LeafRejection : uint32_t { none, parameters, slopes }; // step 2: off, mode P, mode S
-enum class Culling : uint32_t { inverse_frustum, frustum_planes };  // C1 + C2, or C3 as control
+enum class LeafRejection : uint32_t {
+    none,
+    parameters,
+    slopes
+}; // step 2: off, mode P, mode S
+enum class Culling : uint32_t {
+    inverse_frustum,
+    frustum_planes
+}; // C1 + C2, or C3 as control
 
 struct TraceOptions {
     Traversal traversal = Traversal::packet;
-    bool entry_points = true;       // MLRTA: search an entry point for each tile
-    uint32_t initial_tile = 128;    // ITS: rays along the side of a tile
-    uint32_t minimum_tile = 32;     // MTS: tiles of at most this size are traced
-    uint32_t split_factor = 4;      // SF: children of a tile that is split, 4 or 16
+    bool entry_points = true;    // MLRTA: search an entry point for each tile
+    uint32_t initial_tile = 128; // ITS: rays along the side of a tile
+    uint32_t minimum_tile = 32;  // MTS: tiles of at most this size are traced
+    uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
 };
 
-// Nearest hits of all rays of the group.
+// Nearest hits of all rays of the group. If the rays are those of a square of pixels,
+// `tile` lets their beams be found from its corners; it changes no hit.
 void trace_closest(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-                   HitGroup hits, Counters &counters);
+                   HitGroup hits, Counters &counters, const CameraTile *tile = nullptr);
 
 // For each ray 1 if anything lies in its interval, else 0.
 void trace_any(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,

@@ -1,4 +1,5 @@
-// What the native renderer knows of a scene: plain data, filled in by bind/ and never changed.
+// What the native renderer knows of a scene: plain data, filled in by bind/ and never
+// changed.
 #pragma once
 
 #include "base/vec.h"
@@ -23,8 +24,8 @@ struct Shape {
     bool flip_normals = false;
 };
 
-// Lambertian reflectance, a colour per side. A side that reflects nothing is black. Front is the
-// side that the shading normal points to (Mitsuba: cos_theta > 0).
+// Lambertian reflectance, a colour per side. A side that reflects nothing is black. Front
+// is the side that the shading normal points to (Mitsuba: cos_theta > 0).
 struct Material {
     Vec3f front{};
     Vec3f back{};
@@ -35,43 +36,46 @@ enum class EmitterType : uint32_t { point, spot, directional, area };
 // Light sources in the order of their declaration, which emitter sampling depends on.
 struct Emitter {
     EmitterType type = EmitterType::point;
-    Vec3f radiance{};            // intensity (point, spot), irradiance (directional), radiance (area)
-    Vec3f position{};            // point, spot: world space
-    Vec3f direction{0, 0, 1};    // spot: axis; directional: the way light travels; unit, world space
-    float cutoff_angle = 0;      // spot: radians, full cut-off measured from the axis
-    float beam_width = 0;        // spot: radians, no fall-off inside
-    uint32_t shape = NONE;       // area: the glowing shape
-    bool rectangle = false;      // area: `rectangle` samples uniformly in its (u, v)
+    Vec3f radiance{}; // intensity (point, spot), irradiance (directional), radiance (area)
+    Vec3f position{}; // point, spot: world space
+    Vec3f direction{0, 0,
+                    1}; // spot: axis; directional: the way light travels; unit, world space
+    float cutoff_angle = 0; // spot: radians, full cut-off measured from the axis
+    float beam_width = 0;   // spot: radians, no fall-off inside
+    uint32_t shape = NONE;  // area: the glowing shape
+    bool rectangle = false; // area: `rectangle` samples uniformly in its (u, v)
     Vec3f corner{}, edge_u{}, edge_v{}; // rectangle: p = corner + u * edge_u + v * edge_v
-    float sampling_weight = 1;   // relative probability of being chosen
+    float sampling_weight = 1;          // relative probability of being chosen
 };
 
 // A pinhole camera (Mitsuba's `perspective`): looks along +z of its frame, x points left.
 struct Camera {
-    Vec3f origin{};                                     // world space
-    std::array<Vec3f, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // camera x, y, z in world space
-    float tan_half_fov_x = 1;                           // of the whole film, crop not considered
-    float near_clip = 0.01f, far_clip = 1e4f;           // distances along the camera's z
-    Vec2f principal_point_offset{};                     // in fractions of the film
+    Vec3f origin{}; // world space
+    std::array<Vec3f, 3> axes{
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};   // camera x, y, z in world space
+    float tan_half_fov_x = 1;                 // of the whole film, crop not considered
+    float near_clip = 0.01f, far_clip = 1e4f; // distances along the camera's z
+    Vec2f principal_point_offset{};           // in fractions of the film
 };
 
 enum class FilterType : uint32_t { box, gaussian };
 
 struct Film {
-    uint32_t width = 1, height = 1;             // pixels of the whole film
+    uint32_t width = 1, height = 1; // pixels of the whole film
     uint32_t crop_x = 0, crop_y = 0;
-    uint32_t crop_width = 1, crop_height = 1;   // the part that is rendered
+    uint32_t crop_width = 1, crop_height = 1; // the part that is rendered
     FilterType filter = FilterType::box;
-    float filter_radius = 0.5f;                 // pixels
-    float filter_stddev = 0.5f;                 // gaussian: pixels
-    bool sample_border = false;                 // also sample a border of the filter's radius
+    float filter_radius = 0.5f; // pixels
+    float filter_stddev = 0.5f; // gaussian: pixels
+    bool sample_border = false; // also sample a border of the filter's radius
 };
 
 struct SceneData {
-    std::shared_ptr<const KdTree> tree;            // its triangles are the scene's faces, in order
-    std::vector<std::array<uint32_t, 3>> faces;    // vertex indices; empty if no shape needs them
-    std::vector<Vec3f> normals;                    // per vertex, unit; empty if no shape needs them
-    std::vector<Shape> shapes;                     // ordered by first_face, covering all faces
+    std::shared_ptr<const KdTree> tree; // its triangles are the scene's faces, in order
+    std::vector<std::array<uint32_t, 3>>
+        faces;                  // vertex indices; empty if no shape needs them
+    std::vector<Vec3f> normals; // per vertex, unit; empty if no shape needs them
+    std::vector<Shape> shapes;  // ordered by first_face, covering all faces
     std::vector<Material> materials;
     std::vector<Emitter> emitters;
     Camera camera;

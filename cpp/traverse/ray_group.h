@@ -8,19 +8,21 @@
 
 namespace mlrt {
 
-// Rays {origin + t * direction, t_min < t <= t_max}, one array a component. Directions need not
-// have unit length; t is in units of the direction. A ray with t_max <= t_min is inactive: it
-// costs nothing and hits nothing. So is one with a component that is not finite or a direction
-// of zero length.
+// Rays {origin + t * direction, t_min < t <= t_max}, one array a component. Directions need
+// not have unit length; t is in units of the direction. A ray with t_max <= t_min is
+// inactive: it costs nothing and hits nothing. So is one with a component that is not
+// finite or a direction of zero length.
 //
-// Neighbours in the group should be neighbours in space: packets are runs of consecutive rays,
-// and a tile is split into runs of equal length. Pixels in Morton order have that property.
+// Neighbours in the group should be neighbours in space: packets are runs of consecutive
+// rays, and a tile is split into runs of equal length. Pixels in Morton order have that
+// property.
 //
 // Arrays are borrowed, hold `count` values and need no alignment or padding.
 struct RayGroup {
     uint32_t count = 0;
 
-    // Either all rays start at common_origin and `origin` is not looked at, or each has its own.
+    // Either all rays start at common_origin and `origin` is not looked at, or each has its
+    // own.
     bool has_common_origin = false;
     Vec3f common_origin{};
     const float *origin[3]{};

@@ -1,0 +1,220 @@
+// The kd-tree and ray queries on NumPy arrays.
+#include "base/parallel.h"
+#include "base/simd.h"
+#include "bind/bind.h"
+#include "bind/build_options.h"
+#include "bind/trace_options.h"
+#include "bind/tree_handle.h"
+#include "geometry/triangle_test.h"
+
+#include <memory>
+#include <mutex>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+using Points = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Faces = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+
+template <typename T>
+using Result = nb::ndarray<nb::numpy, T, nb::shape<-1>>;
+
+template <typename T>
+Result<T> to_numpy(std::vector<T> &&values) {
+    auto owned = std::make_unique<std::vector<T>>(std::move(values));
+    std::vector<T> &vector = *owned;
+    nb::capsule owner(owned.get(),
+                      [](void *p) noexcept { delete static_cast<std::vector<T> *>(p); });
+    owned.release();
+    return Result<T>(vector.data(), {vector.size()}, owner);
+}
+
+TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
+    const BuildOptions build_options = build_options_from(options);
+    const size_t vertex_count = vertices.shape(0), face_count = faces.shape(0);
+    if (face_count >= NO_PRIMITIVE)
+        throw nb::value_error("a tree holds at most 2^32 - 2 faces");
+    nb::gil_scoped_release release;
+    std::vector<Triangle> triangles(face_count);
+    for (size_t i = 0; i < face_count; ++i) {
+        Vec3f corner[3];
+        for (int j = 0; j < 3; ++j) {
+            const uint32_t v = faces(i, size_t(j));
+            if (v >= vertex_count)
+                throw std::out_of_range("face " + std::to_string(i) + " refers to vertex " +
+                                        std::to_string(v) + ", but there are only " +
+                                        std::to_string(vertex_count));
+            corner[j] = {vertices(v, 0), vertices(v, 1), vertices(v, 2)};
+        }
+        triangles[i] = {corner[0], corner[1], corner[2]};
+    }
+    KeepDenormals keep;
+    BuiltTree built = build_kd_tree(std::move(triangles), build_options);
+    return {std::make_shared<const KdTree>(std::move(built.tree)), built.report};
+}
+
+// Rays of a query, one array a component.
+class RayArrays {
+public:
+    RayArrays(const Points &origins, const Points &directions, const Values &t_min,
+              const Values &t_max)
+        : t_min_(t_min.data()), t_max_(t_max.data()), count_(origins.shape(0)) {
+        if (directions.shape(0) != count_ || t_min.shape(0) != count_ ||
+            t_max.shape(0) != count_)
+            throw nb::value_error(
+                "origins, directions, t_min and t_max must have the same length");
+        if (count_ > 0xffffff00u)
+            throw nb::value_error("at most 2^32 - 256 rays at a time");
+        nb::gil_scoped_release release;
+        for (int k = 0; k < 3; ++k) {
+            origins_[k].resize(count_);
+            directions_[k].resize(count_);
+            for (size_t i = 0; i < count_; ++i) {
+                origins_[k][i] = origins(i, size_t(k));
+                directions_[k][i] = directions(i, size_t(k));
+            }
+        }
+    }
+
+    size_t count() const { return count_; }
+
+    Vec3f origin(size_t i) const {
+        return {origins_[0][i], origins_[1][i], origins_[2][i]};
+    }
+    Vec3f direction(size_t i) const {
+        return {directions_[0][i], directions_[1][i], directions_[2][i]};
+    }
+
+    RayGroup group(size_t first, size_t count) const {
+        RayGroup group;
+        group.count = uint32_t(count);
+        for (int k = 0; k < 3; ++k) {
+            group.origin[k] = origins_[k].data() + first;
+            group.direction[k] = directions_[k].data() + first;
+        }
+        group.t_min = t_min_ + first;
+        group.t_max = t_max_ + first;
+        // A common origin costs less, and cameras and point lights have one.
+        group.common_origin = origin(first);
+        group.has_common_origin = true;
+        for (size_t i = first; i < first + count && group.has_common_origin; ++i)
+            group.has_common_origin = origin(i) == group.common_origin;
+        return group;
+    }
+
+    // Calls trace(first, group, counters) on runs of rays, in parallel. Returns what was
+    // counted.
+    template <typename Trace>
+    Counters for_each_group(uint32_t group_size, Trace &&trace) const {
+        Counters total;
+        std::mutex mutex;
+        parallel_for(uint32_t((count_ + group_size - 1) / group_size), [&](uint32_t index) {
+            const size_t first = size_t(index) * group_size;
+            Counters counters;
+            trace(first, group(first, std::min<size_t>(group_size, count_ - first)),
+                  counters);
+            const std::lock_guard lock(mutex);
+            total += counters;
+        });
+        return total;
+    }
+
+private:
+    std::vector<float> origins_[3], directions_[3];
+    const float *t_min_, *t_max_;
+    size_t count_;
+};
+
+uint32_t group_size(const TraceOptions &options) {
+    return std::max(options.initial_tile * options.initial_tile, 1024u);
+}
+
+nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
+                      const Points &directions, const Values &t_min, const Values &t_max,
+                      const nb::dict &options, const nb::object &counters_out) {
+    const TraceOptions trace_options = trace_options_from(options);
+    const RayArrays rays(origins, directions, t_min, t_max);
+    std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
+    std::vector<uint32_t> primitive(rays.count());
+    Counters counters;
+    {
+        nb::gil_scoped_release release;
+        counters = rays.for_each_group(
+            group_size(trace_options),
+            [&](size_t first, const RayGroup &group, Counters &c) {
+                trace_closest(*self.tree, group, trace_options,
+                              {t.data() + first, primitive.data() + first}, c);
+                for (size_t i = first; i < first + group.count; ++i)
+                    if (primitive[i] != NO_PRIMITIVE) {
+                        const Vec2f uv = barycentrics(rays.origin(i), rays.direction(i),
+                                                      self.tree->triangles[primitive[i]]);
+                        u[i] = uv.x;
+                        v[i] = uv.y;
+                    }
+            });
+    }
+    if (!counters_out.is_none())
+        nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
+    return nb::make_tuple(to_numpy(std::move(t)), to_numpy(std::move(primitive)),
+                          to_numpy(std::move(u)), to_numpy(std::move(v)));
+}
+
+nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &directions,
+                   const Values &t_min, const Values &t_max, const nb::dict &options,
+                   const nb::object &counters_out) {
+    const TraceOptions trace_options = trace_options_from(options);
+    const RayArrays rays(origins, directions, t_min, t_max);
+    std::vector<uint8_t> occluded(rays.count());
+    Counters counters;
+    {
+        nb::gil_scoped_release release;
+        counters = rays.for_each_group(
+            group_size(trace_options),
+            [&](size_t first, const RayGroup &group, Counters &c) {
+                trace_any(*self.tree, group, trace_options, occluded.data() + first, c);
+            });
+    }
+    if (!counters_out.is_none())
+        nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
+    return nb::cast(to_numpy(std::move(occluded)));
+}
+
+} // namespace
+
+void bind_tree(nb::module_ &m) {
+    nb::class_<TreeHandle>(m, "KdTree")
+        .def(
+            "__init__",
+            [](TreeHandle *self, const Points &vertices, const Faces &faces,
+               const nb::kwargs &options) {
+                new (self) TreeHandle(build(vertices, faces, options));
+            },
+            nb::arg("vertices"), nb::arg("faces"), nb::arg("options"))
+        .def_prop_ro("report",
+                     [](const TreeHandle &self) { return report_to_dict(self.report); })
+        .def_prop_ro("bounds",
+                     [](const TreeHandle &self) {
+                         const Box3f &b = self.tree->bounds;
+                         return nb::make_tuple(nb::make_tuple(b.lo.x, b.lo.y, b.lo.z),
+                                               nb::make_tuple(b.hi.x, b.hi.y, b.hi.z));
+                     })
+        .def("closest_hit", &closest_hit, nb::arg("origins"), nb::arg("directions"),
+             nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),
+             nb::arg("counters") = nb::none(),
+             "t float32, primitive uint32 (2^32 - 1 for a miss), u and v float32, each "
+             "(N,). What "
+             "was counted is added to the dictionary `counters`.")
+        .def("any_hit", &any_hit, nb::arg("origins"), nb::arg("directions"),
+             nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),
+             nb::arg("counters") = nb::none(),
+             "uint8 (N,), 1 where something lies in the interval.");
+}
+
+} // namespace mlrt

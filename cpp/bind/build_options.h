@@ -1,0 +1,55 @@
+// BuildOptions and BuildReport as Python dicts.
+#pragma once
+
+#include "bind/fields.h"
+#include "kdtree/builder.h"
+
+namespace mlrt {
+
+// Fields that are missing keep their default. Raises ValueError for an unknown one or a bad
+// value.
+inline BuildOptions build_options_from(nanobind::handle dict) {
+    Fields fields(dict, "options");
+    BuildOptions options;
+    options.traversal_cost = fields.number("traversal_cost", options.traversal_cost);
+    options.intersection_cost =
+        fields.number("intersection_cost", options.intersection_cost);
+    options.empty_bonus = fields.number("empty_bonus", options.empty_bonus);
+    options.clip = fields.boolean("clip", options.clip);
+    options.rule_empty_cell = fields.boolean("rule_empty_cell", options.rule_empty_cell);
+    options.rule_flat_cell = fields.boolean("rule_flat_cell", options.rule_flat_cell);
+    options.rule_area_floor = fields.boolean("rule_area_floor", options.rule_area_floor);
+    options.empty_cell_share = fields.number("empty_cell_share", options.empty_cell_share);
+    options.area_floor = fields.number("area_floor", options.area_floor);
+    options.max_depth = int(fields.integer_or("max_depth", 0, MAX_TREE_DEPTH));
+    fields.finish();
+    if (!(options.traversal_cost > 0 && options.intersection_cost > 0))
+        refuse_value("traversal_cost and intersection_cost must be positive.");
+    if (!(options.empty_bonus > 0 && options.empty_bonus <= 1))
+        refuse_value("empty_bonus must be in (0, 1].");
+    if (!(options.empty_cell_share > 0 && options.empty_cell_share <= 1))
+        refuse_value("empty_cell_share must be in (0, 1].");
+    if (!(options.area_floor >= 0 && options.area_floor <= 1))
+        refuse_value(
+            "area_floor must be in [0, 1]; 0 chooses it by the number of triangles.");
+    return options;
+}
+
+inline nanobind::dict report_to_dict(const BuildReport &report) {
+    nanobind::dict dict;
+    dict["inner_nodes"] = report.inner_nodes;
+    dict["leaves"] = report.leaves;
+    dict["empty_leaves"] = report.empty_leaves;
+    dict["references"] = report.references;
+    dict["max_leaf_count"] = report.max_leaf_count;
+    dict["depth"] = report.depth;
+    dict["empty_cell_splits"] = report.empty_cell_splits;
+    dict["flat_cell_splits"] = report.flat_cell_splits;
+    dict["area_floor_leaves"] = report.area_floor_leaves;
+    dict["dropped_triangles"] = report.dropped_triangles;
+    dict["sah_cost"] = report.sah_cost;
+    dict["seconds"] = report.seconds;
+    return dict;
+}
+
+} // namespace mlrt

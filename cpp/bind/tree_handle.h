@@ -1,0 +1,15 @@
+// The tree as Python holds it.
+#pragma once
+
+#include "kdtree/builder.h"
+
+#include <memory>
+
+namespace mlrt {
+
+struct TreeHandle {
+    std::shared_ptr<const KdTree> tree;
+    BuildReport report;
+};
+
+} // namespace mlrt

@@ -1,0 +1,170 @@
+// Sixteen rays side by side, and one triangle against all of them.
+#pragma once
+
+#include "base/simd.h"
+#include "base/vec.h"
+#include "geometry/triangle_test.h"
+
+#include <limits>
+
+namespace mlrt {
+
+// Where the rays of a packet start: all in one point, or each in its own.
+struct CommonOrigin {
+    Vec3f point{};
+
+    Vec3f of_lane(uint32_t) const { return point; }
+};
+
+struct LaneOrigins {
+    Vec3<FloatPacket> point;
+
+    Vec3f of_lane(uint32_t lane) const {
+        return {point.x.entry(lane), point.y.entry(lane), point.z.entry(lane)};
+    }
+};
+
+// Lanes that are not active hold a ray that is harmless to compute with.
+template <typename Origin>
+struct RayPacket {
+    Origin origin;
+    Vec3<FloatPacket> direction;
+    Vec3<FloatPacket> reciprocal; // 1 / direction, infinite for zero
+    FloatPacket t_min, t_max;     // a hit counts if t_min < t <= t_max
+    Vec3f max_direction;          // greatest |direction| of any lane, by component
+    LaneBits active = 0;
+
+    Vec3f lane_direction(uint32_t lane) const {
+        return {direction.x.entry(lane), direction.y.entry(lane), direction.z.entry(lane)};
+    }
+};
+
+// Lanes whose ray hits a triangle anywhere on its line, and where.
+struct PacketCandidates {
+    LaneBits hit = 0;
+    FloatPacket t;             // of the lanes that hit
+    uint32_t double_tests = 0; // lanes that single precision left undecided
+    uint32_t exact_tests = 0;  // ... and that double precision left undecided
+};
+
+inline constexpr float FLOAT_ROUNDOFF = 0x1p-24f;
+
+// The volumes U, V, W of triangle_test.h in single precision, and a bound on their error
+// that holds for all active lanes. They only filter: what they leave open is decided
+// exactly, so they may be evaluated in any way that keeps the bound.
+struct FilteredVolumes {
+    FloatPacket u, v, w;
+    FloatPacket error;
+
+    // Edge normals belong to the triangle and the origin: three dot products a lane remain.
+    FilteredVolumes(const RayPacket<CommonOrigin> &rays, const Triangle &triangle) {
+        const Vec3d o(rays.origin.point);
+        const Vec3d a = Vec3d(triangle.a) - o;
+        const Vec3d b = Vec3d(triangle.b) - o;
+        const Vec3d c = Vec3d(triangle.c) - o;
+        const Vec3d max_direction(rays.max_direction);
+        // Rounding the normal to float, the product and two sums: four in a row, 5 with the
+        // rounding of the bound. The normal's own error in double adds as in
+        // triangle_test.cpp. The last term outweighs what underflow can lose.
+        const auto edge = [&](const Vec3d &p, const Vec3d &q, FloatPacket &volume) {
+            const Vec3d normal = cross(p, q);
+            const Vec3f n(normal);
+            volume = drjit::fmadd(
+                rays.direction.x, FloatPacket(n.x),
+                drjit::fmadd(rays.direction.y, FloatPacket(n.y), rays.direction.z * n.z));
+            return 5.0 * double(FLOAT_ROUNDOFF) * dot(abs(normal), max_direction) +
+                   10 * DOUBLE_ROUNDOFF * dot(cross_magnitude(p, q), max_direction);
+        };
+        const double bound =
+            std::max({edge(b, c, u), edge(c, a, v), edge(a, b, w), double(SMALLEST_BOUND)});
+        error = FloatPacket(float(bound * 1.000001));
+    }
+
+    // Differences, products, subtraction, product and sums: seven roundings in a row, each
+    // of the six terms of a volume at most |d|_1 times the square of the largest component.
+    FilteredVolumes(const RayPacket<LaneOrigins> &rays, const Triangle &triangle) {
+        const auto relative = [&](const Vec3f &p) -> Vec3<FloatPacket> {
+            return {p.x - rays.origin.point.x, p.y - rays.origin.point.y,
+                    p.z - rays.origin.point.z};
+        };
+        const auto largest = [](const Vec3<FloatPacket> &p) {
+            return maximum(absolute(p.x), maximum(absolute(p.y), absolute(p.z)));
+        };
+        const Vec3<FloatPacket> a = relative(triangle.a);
+        const Vec3<FloatPacket> b = relative(triangle.b);
+        const Vec3<FloatPacket> c = relative(triangle.c);
+        u = dot(rays.direction, cross(b, c));
+        v = dot(rays.direction, cross(c, a));
+        w = dot(rays.direction, cross(a, b));
+        const FloatPacket size = maximum(largest(a), maximum(largest(b), largest(c)));
+        const FloatPacket direction_sum = absolute(rays.direction.x) +
+                                          absolute(rays.direction.y) +
+                                          absolute(rays.direction.z);
+        error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) + SMALLEST_BOUND;
+    }
+
+    // Lanes that certainly hit, and lanes that neither certainly hit nor certainly miss.
+    // Comparisons with NaN are false, so what overflowed stays undecided.
+    LaneBits certain_hits() const {
+        return to_bits((least() > error) | (greatest() < -error));
+    }
+    LaneBits certain_misses() const {
+        return to_bits((least() < -error) & (greatest() > error));
+    }
+
+private:
+    static constexpr float SMALLEST_BOUND = 0x1p-120f;
+
+    FloatPacket least() const { return minimum(u, minimum(v, w)); }
+    FloatPacket greatest() const { return maximum(u, maximum(v, w)); }
+};
+
+template <typename Origin>
+auto plane_numerator(const RayPacket<Origin> &rays, const TrianglePlane &plane,
+                     const Triangle &triangle) {
+    const Vec3d a(triangle.a);
+    if constexpr (std::is_same_v<Origin, CommonOrigin>) {
+        return PlaneNumerator<double>(plane, a - Vec3d(rays.origin.point));
+    } else {
+        const Vec3<DoublePacket> o = to_double(rays.origin.point);
+        return PlaneNumerator<DoublePacket>(
+            plane, Vec3<DoublePacket>{a.x - o.x, a.y - o.y, a.z - o.z});
+    }
+}
+
+// Tests one triangle against the given lanes, with the decisions and distances of
+// triangle_test.h, whatever the packet.
+template <typename Origin>
+PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
+                           const Triangle &triangle) {
+    PacketCandidates result;
+    const FilteredVolumes volumes(rays, triangle);
+    const LaneBits misses = volumes.certain_misses();
+    if ((lanes & ~misses) == 0)
+        return result;
+    result.hit = volumes.certain_hits() & lanes;
+    for_each_lane(lanes & ~(misses | result.hit), [&](uint32_t lane) {
+        const HitDecision decision =
+            decide_hit(rays.origin.of_lane(lane), rays.lane_direction(lane), triangle);
+        result.hit |= LaneBits(decision.hit) << lane;
+        ++result.double_tests;
+        result.exact_tests += decision.precision == Precision::exact;
+    });
+    if (result.hit == 0)
+        return result;
+
+    const TrianglePlane plane(triangle);
+    const Vec3<DoublePacket> direction = to_double(rays.direction);
+    const DoublePacket max_direction = maximum(
+        absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
+    const PlaneDistance<DoublePacket> distance(
+        plane, plane_numerator(rays, plane, triangle), direction, max_direction);
+    result.t = FloatPacket(distance.t);
+    for_each_lane(result.hit & ~to_bits(distance.accurate), [&](uint32_t lane) {
+        result.t.entry(lane) = float(
+            exact_distance(rays.origin.of_lane(lane), rays.lane_direction(lane), triangle));
+    });
+    return result;
+}
+
+} // namespace mlrt

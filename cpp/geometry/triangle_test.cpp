@@ -1,0 +1,113 @@
+#include "geometry/triangle_test.h"
+
+#include "base/expansion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+using ExactVec3 = std::array<Expansion, 3>;
+
+ExactVec3 exact_difference(Vec3f a, Vec3f b) {
+    return {Expansion::difference(a.x, b.x), Expansion::difference(a.y, b.y),
+            Expansion::difference(a.z, b.z)};
+}
+
+ExactVec3 exact_cross(const ExactVec3 &a, const ExactVec3 &b) {
+    return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+            a[0] * b[1] - a[1] * b[0]};
+}
+
+Expansion exact_dot(const ExactVec3 &a, const ExactVec3 &b) {
+    return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2];
+}
+
+ExactVec3 exact_vector(Vec3f v) {
+    return {Expansion(v.x), Expansion(v.y), Expansion(v.z)};
+}
+
+int exact_volume_sign(Vec3f direction, const ExactVec3 &b, const ExactVec3 &c) {
+    return exact_dot(exact_vector(direction), exact_cross(b, c)).sign();
+}
+
+// det(d, b, c) in double with a bound on its error: each difference, the products, the
+// subtraction and the two additions round once, seven in a row (gamma_7); 10 covers the
+// rounding of the bound itself.
+struct Volume {
+    double value, error;
+
+    Volume(Vec3d d, Vec3d b, Vec3d c)
+        : value(dot(d, cross(b, c))),
+          error(10 * DOUBLE_ROUNDOFF * dot(abs(d), cross_magnitude(b, c))) {}
+
+    // The sign if it is certain, else 0.
+    int sign() const { return value > error ? 1 : value < -error ? -1 : 0; }
+};
+
+bool same_side(int u, int v, int w) {
+    const int least = std::min({u, v, w}), greatest = std::max({u, v, w});
+    return (least >= 0 && greatest > 0) || (greatest <= 0 && least < 0);
+}
+
+} // namespace
+
+HitDecision decide_hit(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+    const Vec3d o(origin), d(direction);
+    const Vec3d a = Vec3d(triangle.a) - o;
+    const Vec3d b = Vec3d(triangle.b) - o;
+    const Vec3d c = Vec3d(triangle.c) - o;
+    const int u = Volume(d, b, c).sign();
+    const int v = Volume(d, c, a).sign();
+    const int w = Volume(d, a, b).sign();
+    if (u * v < 0 || v * w < 0 || w * u < 0)
+        return {false, Precision::filtered};
+    if (u != 0 && v != 0 && w != 0)
+        return {true, Precision::filtered};
+
+    const ExactVec3 ea = exact_difference(triangle.a, origin);
+    const ExactVec3 eb = exact_difference(triangle.b, origin);
+    const ExactVec3 ec = exact_difference(triangle.c, origin);
+    return {same_side(u != 0 ? u : exact_volume_sign(direction, eb, ec),
+                      v != 0 ? v : exact_volume_sign(direction, ec, ea),
+                      w != 0 ? w : exact_volume_sign(direction, ea, eb)),
+            Precision::exact};
+}
+
+double exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+    const ExactVec3 normal = exact_cross(exact_difference(triangle.b, triangle.a),
+                                         exact_difference(triangle.c, triangle.a));
+    const Expansion numerator = exact_dot(normal, exact_difference(triangle.a, origin));
+    const Expansion denominator = exact_dot(normal, exact_vector(direction));
+    return numerator.estimate() / denominator.estimate();
+}
+
+float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+    const TrianglePlane plane(triangle);
+    const PlaneNumerator<double> numerator(plane, Vec3d(triangle.a) - Vec3d(origin));
+    const Vec3d d(direction);
+    const PlaneDistance<double> distance(plane, numerator, d, max_component(abs(d)));
+    return float(distance.accurate ? distance.t
+                                   : exact_distance(origin, direction, triangle));
+}
+
+Vec2f barycentrics(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+    const Vec3d o(origin), d(direction);
+    const Vec3d a = Vec3d(triangle.a) - o;
+    const Vec3d b = Vec3d(triangle.b) - o;
+    const Vec3d c = Vec3d(triangle.c) - o;
+    // All three have one sign or are rounding noise around zero.
+    const double u = std::abs(dot(d, cross(b, c)));
+    const double v = std::abs(dot(d, cross(c, a)));
+    const double w = std::abs(dot(d, cross(a, b)));
+    const double sum = u + v + w;
+    if (!(sum > 0))
+        return {0, 0};
+    const float weight_b = float(v / sum);
+    return {weight_b, std::min(float(w / sum), 1 - weight_b)};
+}
+
+} // namespace mlrt

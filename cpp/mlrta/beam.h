@@ -1,0 +1,83 @@
+// A beam: what all rays of a group have in common (Reshetov, Soupikov, Hurley 2005,
+// section 3.1).
+//
+// Bounds are in double precision and hold for the rays as they are stored, in single
+// precision: whoever builds a beam accounts for how the directions were computed.
+#pragma once
+
+#include "base/vec.h"
+#include "mlrta/range.h"
+#include "traverse/ray_group.h"
+
+#include <array>
+#include <cstdint>
+#include <span>
+
+namespace mlrt {
+
+enum class Heading : int8_t { negative = -1, mixed = 0, positive = 1 };
+
+struct Beam {
+    std::array<Range, 3> origin; // one point if the rays have a common origin
+
+    // Whether every direction has the same strict sign along an axis. Along an axis of
+    // mixed heading there are no slopes, and the beam never culls by planes across it.
+    std::array<Heading, 3> heading{};
+
+    // slope[k][j] bounds d_j / d_k and reciprocal[k] bounds 1 / d_k, for k not mixed.
+    std::array<std::array<Range, 3>, 3> slope;
+    std::array<Range, 3> reciprocal;
+
+    double t_max = 0; // no ray ends later
+
+    // Inward normals n of four planes through a common origin that hold all directions d
+    // between them, and how far rounding may carry a direction beyond one: n.d >=
+    // -plane_slack times the sum of |n_k| times the largest |d_k|. For the classic frustum
+    // test only.
+    std::array<Vec3d, 4> plane_normals{};
+    double plane_slack = 0;
+    bool has_planes = false;
+
+    bool has_common_origin() const {
+        return origin[0].lo == origin[0].hi && origin[1].lo == origin[1].hi &&
+               origin[2].lo == origin[2].hi;
+    }
+};
+
+// A camera's rays: direction(x, y) = base + x * dx + y * dy in film coordinates (pixels),
+// evaluated in single precision as (base + x * dx) + y * dy by component.
+struct CameraMap {
+    Vec3f origin;
+    Vec3f base, dx, dy;
+};
+
+// A square of pixels whose rays form a group: pixels in Morton order (x in the even bits),
+// and for each pixel its samples, anywhere in the pixel's unit square.
+struct CameraTile {
+    CameraMap camera;
+    uint32_t x, y;    // of the lower corner, in film coordinates
+    uint32_t size;    // pixels along the side, a power of two
+    uint32_t samples; // rays a pixel
+};
+
+// B1: the beam of a rectangle of the film, x in [x0, x1], y in [y0, y1].
+//
+// A slope is a quotient of two functions that are linear in (x, y), so where the
+// denominator does not vanish it is monotone along every line and extreme at a corner; this
+// holds for directions shifted by a constant too. A computed direction differs from the
+// exact one by at most delta_j = 4u (|base_j| + |x dx_j| + |y dy_j|), so the quotients of
+// the corners' intervals [d_j - delta_j, d_j + delta_j] bound all of them.
+Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, double y1,
+                 double t_max);
+
+// B1 for a run of the tile's rays that is an aligned square or double square of pixels.
+// Returns whether it is one.
+bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_max,
+               Beam &beam);
+
+// B2 and B3: the beam of rays as they are. B2 is the case of a common origin, such as a
+// light with the points it may reach. Inactive rays do not count. If there is no active one
+// the beam has mixed headings and an empty origin: it excludes nothing.
+Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count);
+
+} // namespace mlrt

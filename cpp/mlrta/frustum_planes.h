@@ -1,0 +1,13 @@
+// The classic test of a box against the planes of a frustum, as a control for the inverse
+// test: a box is outside if it lies wholly behind one plane (Assarsson and Moeller 2000,
+// p-vertex).
+#pragma once
+
+#include "mlrta/beam.h"
+
+namespace mlrt {
+
+// Whether the box may meet the beam; always true for beams without planes.
+bool may_enter_by_planes(const Beam &beam, const Box3f &cell);
+
+} // namespace mlrt

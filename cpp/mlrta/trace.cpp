@@ -1,0 +1,222 @@
+#include "mlrta/trace.h"
+
+#include "mlrta/beam_judge.h"
+#include "traverse/interval.h"
+#include "traverse/load_packet.h"
+#include "traverse/packet.h"
+#include "traverse/single.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <limits>
+
+namespace mlrt {
+
+namespace {
+
+// Where the answers of a query go.
+struct ClosestOutput {
+    static constexpr Query query = Query::closest;
+    HitGroup hits;
+
+    void clear(uint32_t count) {
+        std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
+        std::fill_n(hits.primitive, count, NO_PRIMITIVE);
+    }
+    void set(uint32_t ray, const Hit &hit) {
+        hits.t[ray] = hit.t;
+        hits.primitive[ray] = hit.primitive;
+    }
+    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
+        alignas(64) std::array<float, PACKET_WIDTH> t;
+        alignas(64) std::array<uint32_t, PACKET_WIDTH> primitive;
+        store(t.data(), state.hits.t);
+        store(primitive.data(), state.hits.primitive);
+        for_each_lane(lanes & state.hits.found, [&](uint32_t lane) {
+            hits.t[first + lane] = t[lane];
+            hits.primitive[first + lane] = primitive[lane];
+        });
+    }
+};
+
+struct AnyOutput {
+    static constexpr Query query = Query::any;
+    uint8_t *occluded;
+
+    void clear(uint32_t count) { std::fill_n(occluded, count, uint8_t(0)); }
+    void set(uint32_t ray, const Hit &hit) {
+        occluded[ray] = hit.primitive != NO_PRIMITIVE;
+    }
+    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
+        for_each_lane(lanes & state.hits.found,
+                      [&](uint32_t lane) { occluded[first + lane] = 1; });
+    }
+};
+
+// Takes one group through one tree.
+template <typename Origin, typename Output>
+class GroupTracer {
+public:
+    GroupTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                const CameraTile *tile, Output output, Counters &counters)
+        : tree_(tree), rays_(rays), options_(options), tile_(tile), output_(output),
+          counters_(counters) {}
+
+    void trace() {
+        output_.clear(rays_.count);
+        if (options_.traversal == Traversal::brute_force || !options_.entry_points) {
+            trace_packets(0, rays_.count, root_entry(tree_));
+            return;
+        }
+        const uint32_t initial = options_.initial_tile * options_.initial_tile;
+        for (uint32_t first = 0; first < rays_.count; first += initial)
+            trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_));
+    }
+
+private:
+    // Searches an entry point for the tile's beam, starting at that of the tile it is part
+    // of, and splits the tile unless it is small, or its entry point is a leaf and cannot
+    // get any deeper.
+    void trace_tile(uint32_t first, uint32_t count, const Entry &parent) {
+        ++counters_.tiles;
+        Beam beam;
+        if (tile_ == nullptr ||
+            !tile_beam(*tile_, first, count, greatest_t_max(first, count), beam))
+            beam = ray_beam(rays_, first, count);
+        BeamJudge judge(beam, options_, counters_);
+        const std::optional<Entry> entry = search_entry_point(tree_.nodes, parent, judge);
+        if (!entry) {
+            ++counters_.missed_tiles;
+            return;
+        }
+        const uint32_t minimum = options_.minimum_tile * options_.minimum_tile;
+        if (count <= minimum || tree_.nodes[entry->node].is_leaf()) {
+            trace_packets(first, count, *entry);
+            return;
+        }
+        const uint32_t share = child_count(count);
+        for (uint32_t offset = 0; offset < count; offset += share)
+            trace_tile(first + offset, std::min(share, count - offset), *entry);
+    }
+
+    // Rays of a child tile, in whole packets.
+    uint32_t child_count(uint32_t count) const {
+        const uint32_t share = (count + options_.split_factor - 1) / options_.split_factor;
+        return (share + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
+    }
+
+    double greatest_t_max(uint32_t first, uint32_t count) const {
+        return *std::max_element(rays_.t_max + first, rays_.t_max + first + count);
+    }
+
+    void trace_packets(uint32_t first, uint32_t count, const Entry &entry) {
+        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
+            auto [packet, extreme] = load_packet<Origin>(rays_, i);
+            const LaneBits in_range = first + count - i >= PACKET_WIDTH
+                                          ? ALL_LANES
+                                          : (1u << (first + count - i)) - 1;
+            packet.active &= in_range;
+            extreme &= in_range;
+            if (options_.traversal == Traversal::single) {
+                extreme |= packet.active;
+                packet.active = 0;
+            }
+            counters_.rays += uint64_t(std::popcount(packet.active | extreme));
+            counters_.packets += (packet.active | extreme) != 0;
+            if (packet.active != 0)
+                trace_one_packet(packet, i, entry);
+            for_each_lane(extreme, [&](uint32_t lane) { trace_one_ray(i + lane, entry); });
+        }
+    }
+
+    void trace_one_packet(const RayPacket<Origin> &packet, uint32_t first,
+                          const Entry &entry) {
+        PacketState<Output::query> state(packet);
+        switch (options_.traversal) {
+        case Traversal::brute_force:
+            for (uint32_t primitive = 0; primitive < tree_.triangles.size(); ++primitive)
+                if (is_finite(tree_.triangles[primitive]))
+                    state.test(packet, state.searching, tree_.triangles[primitive],
+                               primitive, counters_);
+            break;
+        case Traversal::interval:
+            if constexpr (std::is_same_v<Origin, CommonOrigin>)
+                trace_interval(tree_, packet, packet.active, entry, state, counters_);
+            else
+                for_each_octant(packet, [&](LaneBits lanes) {
+                    trace_interval(tree_, packet, lanes, entry, state, counters_);
+                });
+            break;
+        case Traversal::packet:
+        case Traversal::single:
+            trace_packet(tree_, packet, entry, state, counters_);
+            break;
+        }
+        output_.set(first, packet.active, state);
+    }
+
+    // One interval serves rays that start apart only if they agree on the order of cells:
+    // calls trace(lanes) for the lanes of each octant of directions.
+    template <typename Trace>
+    static void for_each_octant(const RayPacket<Origin> &packet, Trace &&trace) {
+        std::array<LaneBits, 3> negative;
+        for (int k = 0; k < 3; ++k)
+            negative[k] = to_bits(packet.direction[k] < 0.0f);
+        for (LaneBits left = packet.active; left != 0;) {
+            const int lane = std::countr_zero(left);
+            LaneBits lanes = left;
+            for (int k = 0; k < 3; ++k)
+                lanes &= (negative[k] >> lane & 1) ? negative[k] : ~negative[k];
+            trace(lanes);
+            left &= ~lanes;
+        }
+    }
+
+    void trace_one_ray(uint32_t i, const Entry &entry) {
+        Ray ray;
+        ray.origin = rays_.common_origin;
+        for (int k = 0; k < 3; ++k) {
+            if constexpr (std::is_same_v<Origin, LaneOrigins>)
+                ray.origin[k] = rays_.origin[k][i];
+            ray.direction[k] = rays_.direction[k][i];
+        }
+        ray.t_min = std::max(rays_.t_min[i], 0.0f);
+        ray.t_max = rays_.t_max[i];
+        output_.set(i, options_.traversal == Traversal::brute_force
+                           ? brute_force(tree_, ray, Output::query, counters_)
+                           : trace_single(tree_, ray, Output::query, entry, counters_));
+    }
+
+    const KdTree &tree_;
+    const RayGroup &rays_;
+    const TraceOptions &options_;
+    const CameraTile *tile_;
+    Output output_;
+    Counters &counters_;
+};
+
+template <typename Output>
+void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                 const CameraTile *tile, Output output, Counters &counters) {
+    if (rays.has_common_origin)
+        GroupTracer<CommonOrigin, Output>(tree, rays, options, tile, output, counters)
+            .trace();
+    else
+        GroupTracer<LaneOrigins, Output>(tree, rays, options, tile, output, counters)
+            .trace();
+}
+
+} // namespace
+
+void trace_closest(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                   HitGroup hits, Counters &counters, const CameraTile *tile) {
+    trace_group(tree, rays, options, tile, ClosestOutput{hits}, counters);
+}
+
+void trace_any(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+               uint8_t *occluded, Counters &counters) {
+    trace_group(tree, rays, options, nullptr, AnyOutput{occluded}, counters);
+}
+
+} // namespace mlrt

@@ -1,0 +1,73 @@
+// From the arrays of a group to packets.
+#pragma once
+
+#include "geometry/ray_packet.h"
+#include "traverse/ray_group.h"
+
+#include <algorithm>
+#include <array>
+
+namespace mlrt {
+
+// A packet, and the lanes that need a traversal of their own because a direction component
+// is so large or small that intersecting planes in single precision could lose it.
+template <typename Origin>
+struct LoadedPacket {
+    RayPacket<Origin> rays;
+    LaneBits extreme = 0;
+};
+
+// Sixteen values from `first` on; what lies past `count` reads as zero.
+inline FloatPacket load_padded(const float *values, uint32_t first, uint32_t count) {
+    if (first + PACKET_WIDTH <= count)
+        return load<FloatPacket>(values + first);
+    std::array<float, PACKET_WIDTH> padded{};
+    std::copy(values + first, values + count, padded.begin());
+    return load<FloatPacket>(padded.data());
+}
+
+template <typename Origin>
+LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
+    // Reciprocals of what is moderate are moderate, and so are parameters of planes.
+    constexpr float SMALLEST_COMPONENT = 0x1p-100f;
+    constexpr float SMALLEST_DIRECTION = 0x1p-60f, LARGEST_DIRECTION = 0x1p60f;
+
+    LoadedPacket<Origin> loaded;
+    RayPacket<Origin> &rays = loaded.rays;
+    rays.t_min = maximum(load_padded(group.t_min, first, group.count), FloatPacket(0.0f));
+    rays.t_max = load_padded(group.t_max, first, group.count);
+    auto active = rays.t_min < rays.t_max;
+    if constexpr (std::is_same_v<Origin, CommonOrigin>) {
+        rays.origin.point = group.common_origin;
+        active &= MaskOf<FloatPacket>(is_finite(group.common_origin));
+    } else {
+        for (int k = 0; k < 3; ++k) {
+            rays.origin.point[k] = load_padded(group.origin[k], first, group.count);
+            active &= absolute(rays.origin.point[k]) < INFINITY;
+        }
+    }
+    FloatPacket largest = 0.0f;
+    MaskOf<FloatPacket> small_component = false;
+    for (int k = 0; k < 3; ++k) {
+        const FloatPacket d = load_padded(group.direction[k], first, group.count);
+        const FloatPacket size = absolute(d);
+        rays.direction[k] = d;
+        rays.reciprocal[k] = 1.0f / d;
+        active &= size < INFINITY;
+        largest = maximum(largest, size);
+        small_component |= (size > 0.0f) & (size < SMALLEST_COMPONENT);
+    }
+    active &= largest > 0.0f;
+    rays.active = to_bits(active);
+    loaded.extreme = to_bits(small_component | (largest < SMALLEST_DIRECTION) |
+                             (largest > LARGEST_DIRECTION)) &
+                     rays.active;
+    rays.active &= ~loaded.extreme;
+    const auto counted = from_bits<FloatPacket>(rays.active);
+    for (int k = 0; k < 3; ++k)
+        rays.max_direction[k] =
+            greatest_lane(select(counted, absolute(rays.direction[k]), FloatPacket(0.0f)));
+    return loaded;
+}
+
+} // namespace mlrt

@@ -1,0 +1,32 @@
+// One ray at a time: the plain reference that the packet traversals are measured against.
+#pragma once
+
+#include "base/counters.h"
+#include "traverse/query.h"
+
+#include <limits>
+
+namespace mlrt {
+
+// The ray {origin + t direction, t_min < t <= t_max}, finite and with a direction other
+// than zero.
+struct Ray {
+    Vec3f origin, direction;
+    float t_min = 0;
+    float t_max = std::numeric_limits<float>::infinity();
+};
+
+// Infinity and NO_PRIMITIVE for a miss. A query for any hit reports the first one it finds.
+struct Hit {
+    float t = std::numeric_limits<float>::infinity();
+    uint32_t primitive = NO_PRIMITIVE;
+};
+
+// X0: every finite triangle, without the tree.
+Hit brute_force(const KdTree &tree, const Ray &ray, Query query, Counters &counters);
+
+// X1: stack traversal of the tree. Directions of any magnitude are allowed.
+Hit trace_single(const KdTree &tree, const Ray &ray, Query query, const Entry &entry,
+                 Counters &counters);
+
+} // namespace mlrt
