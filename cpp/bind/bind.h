@@ -6,6 +6,7 @@
 namespace mlrt {
 
 void bind_kdtree_selftest(nanobind::module_ &m);
+void bind_mlrta_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);
 void bind_tree(nanobind::module_ &m);
 
