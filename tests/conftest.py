@@ -11,6 +11,20 @@ import repository
 import scene_files
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--full",
+        action="store_true",
+        help="take the numbers of rays and samples that are published, not a share of them",
+    )
+
+
+@pytest.fixture
+def full(request: pytest.FixtureRequest) -> bool:
+    """Whether the run is to take its full size."""
+    return bool(request.config.getoption("--full"))
+
+
 @pytest.fixture
 def shared_scene() -> Callable[[str], Path]:
     """Finds a third-party scene beside the checkout; the test is skipped if it is

@@ -23,24 +23,24 @@ using Points = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::devi
 using Faces = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
-template <typename T>
-using Result = nb::ndarray<nb::numpy, T, nb::shape<-1>>;
-
-template <typename T>
-Result<T> to_numpy(std::vector<T> &&values) {
-    auto owned = std::make_unique<std::vector<T>>(std::move(values));
-    std::vector<T> &vector = *owned;
-    nb::capsule owner(owned.get(),
-                      [](void *p) noexcept { delete static_cast<std::vector<T> *>(p); });
+// The values as an array of T, which they have the representation of.
+template <typename T, typename Stored>
+nb::ndarray<nb::numpy, T, nb::shape<-1>> to_numpy(std::vector<Stored> &&values) {
+    static_assert(sizeof(T) == sizeof(Stored));
+    auto owned = std::make_unique<std::vector<Stored>>(std::move(values));
+    std::vector<Stored> &vector = *owned;
+    nb::capsule owner(owned.get(), [](void *p) noexcept {
+        delete static_cast<std::vector<Stored> *>(p);
+    });
     owned.release();
-    return Result<T>(vector.data(), {vector.size()}, owner);
+    return {vector.data(), {vector.size()}, owner};
 }
 
 TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
     const BuildOptions build_options = build_options_from(options);
     const size_t vertex_count = vertices.shape(0), face_count = faces.shape(0);
-    if (face_count >= NO_PRIMITIVE)
-        throw nb::value_error("a tree holds at most 2^32 - 2 faces");
+    if (face_count > 0x7fffffffu)
+        throw nb::value_error("a tree holds at most 2^31 - 1 faces");
     nb::gil_scoped_release release;
     std::vector<Triangle> triangles(face_count);
     for (size_t i = 0; i < face_count; ++i) {
@@ -162,8 +162,9 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     }
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::make_tuple(to_numpy(std::move(t)), to_numpy(std::move(primitive)),
-                          to_numpy(std::move(u)), to_numpy(std::move(v)));
+    return nb::make_tuple(to_numpy<float>(std::move(t)),
+                          to_numpy<int32_t>(std::move(primitive)),
+                          to_numpy<float>(std::move(u)), to_numpy<float>(std::move(v)));
 }
 
 nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &directions,
@@ -183,7 +184,7 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     }
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::cast(to_numpy(std::move(occluded)));
+    return nb::cast(to_numpy<bool>(std::move(occluded)));
 }
 
 } // namespace
@@ -208,13 +209,13 @@ void bind_tree(nb::module_ &m) {
         .def("closest_hit", &closest_hit, nb::arg("origins"), nb::arg("directions"),
              nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),
              nb::arg("counters") = nb::none(),
-             "t float32, primitive uint32 (2^32 - 1 for a miss), u and v float32, each "
+             "t float32, primitive int32 (-1 for a miss), u and v float32, each "
              "(N,). What "
              "was counted is added to the dictionary `counters`.")
         .def("any_hit", &any_hit, nb::arg("origins"), nb::arg("directions"),
              nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),
              nb::arg("counters") = nb::none(),
-             "uint8 (N,), 1 where something lies in the interval.");
+             "bool (N,), whether something lies in the interval.");
 }
 
 } // namespace mlrt
