@@ -82,7 +82,9 @@ class KdTree:
         misses. Raises ValueError for arrays of another shape or type.
         """
         rays = ray_arrays(origins, directions, t_min, t_max)
-        return Hits(*self._tree.closest_hit(*rays, trace_options(options)))
+        t, primitive, u, v = self._tree.closest_hit(*rays, trace_options(options))
+        # The core's mark of a miss, 2^32 - 1, is -1 as a signed number.
+        return Hits(t, primitive.view(np.int32), u, v)
 
     def any_hit(
         self,
@@ -95,8 +97,8 @@ class KdTree:
         """Whether anything lies on each ray: (N,) bool. Arguments are those of
         `closest_hit`."""
         rays = ray_arrays(origins, directions, t_min, t_max)
-        occluded: npt.NDArray[np.bool_] = self._tree.any_hit(*rays, trace_options(options))
-        return occluded
+        occluded: npt.NDArray[np.uint8] = self._tree.any_hit(*rays, trace_options(options))
+        return occluded.view(np.bool_)
 
 
 def trace_options(options: dict[str, Any]) -> dict[str, Any]:

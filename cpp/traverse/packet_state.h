@@ -38,10 +38,13 @@ struct PacketState {
         if (candidates.hit == 0)
             return;
         const auto in_front = candidates.t > rays.t_min;
-        const auto nearer = (candidates.t < hits.t) |
-                            ((candidates.t == hits.t) &
-                             MaskOf<FloatPacket>(UIntPacket(primitive) < hits.primitive));
-        const LaneBits better = to_bits(in_front & nearer) & candidates.hit;
+        // Dr.Jit compares unsigned integers as signed ones on AVX-512, where NO_PRIMITIVE
+        // is the least: a lane without a hit is told by `found` instead.
+        const LaneBits lower_number =
+            to_bits(UIntPacket(primitive) < hits.primitive) | ~hits.found;
+        const LaneBits nearer = to_bits(candidates.t < hits.t) |
+                                (to_bits(candidates.t == hits.t) & lower_number);
+        const LaneBits better = to_bits(in_front) & nearer & candidates.hit;
         if (better == 0)
             return;
         hits.found |= better;
