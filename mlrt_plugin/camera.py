@@ -12,6 +12,11 @@ from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
 from .scene_arrays import Camera, Film
 
+LARGEST_RADIUS = 64
+"""Pixels that a reconstruction filter may reach; chosen, far above any in use."""
+LARGEST_FILM = 1 << 30
+"""Pixels that a film may have; chosen, 12 GiB of colours."""
+
 
 def read_camera(sensor: Any, name: str) -> Camera:
     """Reads a `perspective` sensor."""
@@ -21,11 +26,14 @@ def read_camera(sensor: Any, name: str) -> Camera:
     to_world = objects.matrix(sensor.world_transform())
     if not np.isfinite(to_world).all() or abs(np.linalg.det(to_world[:3, :3])) < 1e-6:
         raise SceneError(f"{name} has a singular to_world: repair it")
+    fov = objects.number(parts["x_fov"])
+    if not 0 < fov < 180:
+        raise SceneError(f"{name} has a field of view of {fov:g} degrees: choose 0 to 180")
     axes = to_world[:3, :3] / np.linalg.norm(to_world[:3, :3], axis=0)
     return Camera(
         origin=objects.vec3(to_world[:3, 3]),
         axes=(objects.vec3(axes[:, 0]), objects.vec3(axes[:, 1]), objects.vec3(axes[:, 2])),
-        tan_half_fov_x=math.tan(math.radians(objects.number(parts["x_fov"])) / 2),
+        tan_half_fov_x=math.tan(math.radians(fov) / 2),
         near_clip=float(sensor.near_clip()),
         far_clip=float(sensor.far_clip()),
         principal_point_offset=(
@@ -49,6 +57,14 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
             f"rfilter '{kind}' of {name} is not supported: only box and gaussian are so far"
         )
     radius = float(rfilter.radius())
+    if not 0 < radius <= LARGEST_RADIUS:
+        raise SceneError(
+            f"rfilter '{kind}' of {name} has a radius of {radius:g} pixels: change it"
+        )
+    if crop_width * crop_height > LARGEST_FILM:
+        raise SceneError(
+            f"{name} has {crop_width}x{crop_height} pixels, which is too many: reduce it"
+        )
     warnings = []
     pixels = objects.described(film, "pixel_format", "rgb")
     if pixels != "rgb":

@@ -62,13 +62,19 @@ def read_emitter(
             sampling_weight=weight,
         )
     if plugin == "spot":
+        cutoff, beam = (objects.number(parts[n]) for n in ("cutoff_angle", "beam_width"))
+        if not 0 <= beam <= cutoff < 180:
+            raise SceneError(
+                f"{name} has cutoff_angle = {cutoff:g} and beam_width = {beam:g}: the "
+                "first must be below 180 and the second no larger than the first"
+            )
         return Emitter(
             "spot",
             objects.color(parts["intensity"], name),
             position=finite(objects.vec3(to_world[:3, 3]), name, "position"),
             direction=axis,
-            cutoff_angle=math.radians(objects.number(parts["cutoff_angle"])),
-            beam_width=math.radians(objects.number(parts["beam_width"])),
+            cutoff_angle=math.radians(cutoff),
+            beam_width=math.radians(beam),
             sampling_weight=weight,
         )
     raise UnsupportedFeature(

@@ -28,7 +28,8 @@ class MlrtWarning(UserWarning):
 def one_sentence(message: str) -> str:
     """Mitsuba's report of an exception as a single line.
 
-    Drops what only its developers need (source locations, classes, terminal colours).
+    Drops what only its developers need (source locations, classes, terminal colours), and
+    says once what nested files repeat.
     """
     message = re.sub(r"\x1b\[[0-9;]*m", "", message)
     message = re.sub(r"\[[\w.]+\.(?:cpp|h):\d+\]\s*", "", message)
@@ -37,4 +38,5 @@ def one_sentence(message: str) -> str:
         r'failed to instantiate (\w+) plugin of type "(\w+)": ', r"\1 '\2': ", message
     )
     message = " ".join(message.split())
+    message = re.sub(r"(.{10,}?: )\1+", r"\1", message)
     return message.rstrip("!. ")

@@ -47,7 +47,7 @@ def integrator_class(module: Any) -> type:
                         f"integrator '{PLUGIN}' supports {name} = {supported} only"
                     )
             self.mlrt_parameters = {
-                name: props.get(name) for name in TRACE_OPTIONS if props.has_property(name)
+                name: props.get(name) for name in TRACE_OPTIONS if name in props
             }
 
         def class_name(self) -> str:

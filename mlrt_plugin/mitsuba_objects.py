@@ -10,7 +10,7 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from .errors import UnsupportedFeature
+from .errors import SceneError, UnsupportedFeature
 from .scene_arrays import Vec3
 
 PLUGIN_OF_CLASS = {
@@ -113,15 +113,15 @@ def matrix(transform: Any) -> npt.NDArray[np.float64]:
 def color(spectrum: Any, owner: str) -> Vec3:
     """Linear RGB of a spectrum that is the same everywhere.
 
-    Raises UnsupportedFeature if it varies in space or is not one that an RGB variant
-    stores as a colour; ``owner`` says in the message what the spectrum belongs to.
+    Raises SceneError if it is not finite, UnsupportedFeature if it varies in space or is
+    not one that an RGB variant stores as a colour; ``owner`` says what it belongs to.
     """
     plugin = plugin_name(spectrum)
-    if plugin == "uniform":
-        value = number(members(spectrum)["value"])
-        return value, value, value
-    if plugin == "srgb":
-        return vec3(members(spectrum)["value"])
+    if plugin in ("uniform", "srgb"):
+        value = np.asarray(members(spectrum)["value"], np.float64).reshape(-1)
+        if not np.isfinite(value).all():
+            raise SceneError(f"{owner} has a colour with NaN or infinite parts: repair it")
+        return vec3(np.broadcast_to(value, 3))
     raise UnsupportedFeature(
         f"{owner} has a '{plugin}' texture, and only constant colours are supported so "
         "far: "

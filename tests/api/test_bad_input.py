@@ -57,6 +57,55 @@ SCENES = {
     "not a number": (moved_floor('<translate x="nan"/>'), "'floor'.*NaN"),
     "infinite": (moved_floor('<scale value="inf"/>'), "'floor'.*NaN or infinite"),
     "overflow": (moved_floor('<scale value="1e38"/><scale value="1e3"/>'), "'floor'"),
+    "colour": (
+        {"emitters": scene_files.LAMP.replace("8, 7, 6", "8, nan, 6")},
+        "'lamp'.*NaN",
+    ),
+    "lamp nowhere": (
+        {"emitters": scene_files.LAMP.replace("1, 2, 3", "1, inf, 3")},
+        "'lamp'.*position",
+    ),
+    "field of view": (
+        {
+            "sensor": scene_files.SENSOR.replace(
+                "<sampler", '<float name="fov" value="nan"/><sampler'
+            )
+        },
+        "field of view",
+    ),
+    "clipping": (
+        {
+            "sensor": scene_files.SENSOR.replace(
+                "<sampler", '<float name="near_clip" value="1e6"/><sampler'
+            )
+        },
+        "near_clip",
+    ),
+    "filter": (
+        {
+            "sensor": scene_files.SENSOR.replace(
+                'type="box"/>',
+                'type="gaussian"><float name="stddev" value="-1"/></rfilter>',
+            )
+        },
+        "radius of -4",
+    ),
+    "spot": (
+        {
+            "emitters": '<emitter type="spot" id="x"><float name="beam_width" value="3e1"/>'
+            "</emitter>"
+        },
+        "'x'.*beam_width = 30",
+    ),
+    "huge film": (film(10**6, 10**6), "1000000x1000000"),
+    "crop outside": (
+        film(16, '12"/><integer name="crop_width" value="99'),
+        "crop",
+    ),
+    "circular reference": (
+        {"extra": '<bsdf type="twosided" id="a"><ref id="a"/></bsdf>'},
+        "circular",
+    ),
     "scaling camera": (
         {"sensor": scene_files.SENSOR.replace("<lookat", '<scale x="2"/><lookat')},
         "[Ss]cale",
