@@ -1,0 +1,133 @@
+// The renderer's parts one by one, for tests that compare each with Mitsuba's.
+#include "bind/bind.h"
+#include "bind/scene_handle.h"
+#include "render/camera.h"
+#include "render/emitter_sampling.h"
+#include "render/film_blocks.h"
+#include "render/sampler.h"
+#include "render/shadow_offset.h"
+#include "render/surface.h"
+
+#include <array>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+using Floats3 = std::array<float, 3>;
+using Doubles3 = std::array<double, 3>;
+
+Vec3f vector(const Floats3 &v) {
+    return {v[0], v[1], v[2]};
+}
+
+template <typename T>
+std::array<T, 3> array(Vec3<T> v) {
+    return {v.x, v.y, v.z};
+}
+
+std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t samples,
+                                  uint32_t pixel, uint32_t sample, uint32_t dimensions) {
+    Pcg32 random = SampleStreams(seed, pixel_count, samples).stream(pixel, sample);
+    std::vector<float> numbers(dimensions);
+    for (float &number : numbers)
+        number = random.next_float();
+    return numbers;
+}
+
+nb::dict image_plane_map(const nb::dict &camera, const nb::dict &film) {
+    const ImagePlane plane = image_plane(camera_from(camera), film_from(film));
+    nb::dict result;
+    result["d0"] = array(plane.d0);
+    result["dx"] = array(plane.dx);
+    result["dy"] = array(plane.dy);
+    return result;
+}
+
+Floats3 camera_direction(const nb::dict &camera, const nb::dict &film, float x, float y) {
+    return array(image_plane(camera_from(camera), film_from(film)).direction(x, y));
+}
+
+std::vector<float> filter_weights(const nb::dict &film,
+                                  const std::vector<float> &distances) {
+    const ReconstructionFilter filter(film_from(film));
+    std::vector<float> weights;
+    for (const float x : distances)
+        weights.push_back(filter.weight(x));
+    return weights;
+}
+
+// Samples of one channel, each of the pixel that its position lies in; what comes back is
+// the value and the weight of every pixel of the crop, row by row.
+std::pair<std::vector<float>, std::vector<float>>
+accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &samples) {
+    const Film film = film_from(film_dict);
+    FilmBlocks blocks(film, 1);
+    const PixelRect &sampled = blocks.sampled();
+    for (const auto &[x, y, value] : samples)
+        blocks.add(uint32_t(int(std::floor(x)) - sampled.x),
+                   uint32_t(int(std::floor(y)) - sampled.y), x, y, &value);
+    std::vector<float> sums, weights;
+    for (uint32_t row = 0; row < film.crop_height; ++row)
+        for (uint32_t column = 0; column < film.crop_width; ++column) {
+            float sum = 0;
+            weights.push_back(blocks.pixel(column, row, &sum));
+            sums.push_back(sum);
+        }
+    return {sums, weights};
+}
+
+nb::dict emitter_sample(const SceneHandle &handle, const Floats3 &p, float x, float y) {
+    const EmitterSample sample = sample_emitter(*handle.scene, vector(p), x, y);
+    nb::dict result;
+    result["emitter"] = sample.emitter == NONE ? -1 : int64_t(sample.emitter);
+    result["weight"] = array(sample.weight);
+    result["direction"] = array(sample.direction);
+    result["target"] = array(sample.target);
+    return result;
+}
+
+nb::dict hit_surface_of(const SceneHandle &handle, const Floats3 &origin,
+                        const Floats3 &direction, uint32_t primitive) {
+    const SurfacePoint point =
+        hit_surface(*handle.scene, vector(origin), vector(direction), primitive);
+    nb::dict result;
+    result["p"] = array(point.p);
+    result["face_normal"] = array(point.face_normal);
+    result["shading_normal"] = array(point.shading_normal);
+    result["shape"] = point.shape;
+    return result;
+}
+
+Floats3 offset_point_of(const Floats3 &p, const Floats3 &normal, const Floats3 &towards) {
+    return array(offset_point(vector(p), vector(normal), vector(towards)));
+}
+
+} // namespace
+
+void bind_render_selftest(nb::module_ &m) {
+    nb::module_ s = m.def_submodule("render_selftest", "Parts of the renderer, for tests.");
+    s.def("sampler_stream", &sampler_stream, nb::arg("seed"), nb::arg("pixel_count"),
+          nb::arg("samples"), nb::arg("pixel"), nb::arg("sample"), nb::arg("dimensions"));
+    s.def("image_plane", &image_plane_map, nb::arg("camera"), nb::arg("film"));
+    s.def("camera_direction", &camera_direction, nb::arg("camera"), nb::arg("film"),
+          nb::arg("x"), nb::arg("y"));
+    s.def("filter_weights", &filter_weights, nb::arg("film"), nb::arg("distances"));
+    s.def("accumulate", &accumulate, nb::arg("film"), nb::arg("samples"));
+    s.def("sample_emitter", &emitter_sample, nb::arg("scene"), nb::arg("p"), nb::arg("x"),
+          nb::arg("y"));
+    s.def("hit_surface", &hit_surface_of, nb::arg("scene"), nb::arg("origin"),
+          nb::arg("direction"), nb::arg("primitive"));
+    s.def("offset_point", &offset_point_of, nb::arg("p"), nb::arg("normal"),
+          nb::arg("towards"));
+    s.attr("SHADOW_EPSILON") = SHADOW_EPSILON;
+}
+
+} // namespace mlrt

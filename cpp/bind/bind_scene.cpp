@@ -1,0 +1,267 @@
+// The class Scene: arrays and dicts of an imported scene, checked once.
+#include "bind/bind.h"
+#include "bind/fields.h"
+#include "bind/scene_handle.h"
+#include "bind/tree_handle.h"
+
+#include <cmath>
+#include <cstring>
+#include <nanobind/ndarray.h>
+#include <string>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+template <typename T>
+using Array = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+
+std::string numbered(const char *list, size_t i) {
+    return std::string(list) + "[" + std::to_string(i) + "]";
+}
+
+template <typename Element, typename T>
+std::vector<Element> rows(const Array<T> &array, const char *name) {
+    static_assert(sizeof(Element) == 3 * sizeof(T));
+    if (array.ndim() != 2 || array.shape(1) != 3)
+        refuse_value(std::string(name) + " must have shape (N, 3).");
+    std::vector<Element> result(array.shape(0));
+    if (!result.empty())
+        std::memcpy(result.data(), array.data(), result.size() * sizeof(Element));
+    return result;
+}
+
+std::vector<Material> materials_from(const Array<float> &array) {
+    if (array.ndim() != 3 || array.shape(1) != 2 || array.shape(2) != 3)
+        refuse_value("materials must have shape (M, 2, 3).");
+    std::vector<Material> materials;
+    for (size_t i = 0; i < array.shape(0); ++i) {
+        const float *in = array.data() + 6 * i;
+        materials.push_back({{in[0], in[1], in[2]}, {in[3], in[4], in[5]}});
+        for (int k = 0; k < 6; ++k)
+            if (!(std::isfinite(in[k]) && in[k] >= 0))
+                refuse_value(numbered("materials", i) +
+                             " must be finite and not negative.");
+    }
+    return materials;
+}
+
+Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scene,
+                 size_t emitter_count) {
+    Fields fields(dict, name);
+    Shape shape;
+    shape.first_face = fields.integer("first_face");
+    shape.face_count = fields.integer("face_count");
+    shape.material = fields.index("material", scene.materials.size(), NONE);
+    shape.emitter = fields.index("emitter", emitter_count, NONE);
+    shape.vertex_normals = fields.boolean("vertex_normals", false);
+    shape.flip_normals = fields.boolean("flip_normals", false);
+    fields.finish();
+    if (shape.vertex_normals && (scene.faces.empty() || scene.normals.empty()))
+        refuse_value(name + " has vertex normals, but faces or normals are empty.");
+    return shape;
+}
+
+Vec3f unit_vector(Fields &fields, const char *key) {
+    const Vec3f v = fields.vector(key);
+    if (std::abs(length(v) - 1) > 1e-3f)
+        refuse_value(fields.path(key) + " must have unit length.");
+    return normalize(v);
+}
+
+Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_count) {
+    Fields fields(dict, name);
+    Emitter emitter;
+    emitter.type =
+        fields.choice<EmitterType>("type", {{"point", EmitterType::point},
+                                            {"spot", EmitterType::spot},
+                                            {"directional", EmitterType::directional},
+                                            {"area", EmitterType::area}});
+    const bool point = emitter.type == EmitterType::point;
+    const bool spot = emitter.type == EmitterType::spot;
+    const bool directional = emitter.type == EmitterType::directional;
+    const bool area = emitter.type == EmitterType::area;
+
+    emitter.radiance = fields.vector("radiance");
+    emitter.position =
+        point || spot ? fields.vector("position") : fields.vector("position", {});
+    emitter.direction = spot || directional ? unit_vector(fields, "direction")
+                                            : fields.vector("direction", {});
+    emitter.cutoff_angle =
+        spot ? fields.number("cutoff_angle") : fields.number("cutoff_angle", 0);
+    emitter.beam_width =
+        spot ? fields.number("beam_width") : fields.number("beam_width", 0);
+    emitter.shape = fields.index("shape", shape_count, NONE);
+    emitter.rectangle = fields.boolean("rectangle", false);
+    const bool rectangle = area && emitter.rectangle;
+    emitter.corner = rectangle ? fields.vector("corner") : fields.vector("corner", {});
+    emitter.edge_u = rectangle ? fields.vector("edge_u") : fields.vector("edge_u", {});
+    emitter.edge_v = rectangle ? fields.vector("edge_v") : fields.vector("edge_v", {});
+    emitter.sampling_weight = fields.number("sampling_weight", 1);
+    fields.finish();
+
+    if (!(emitter.sampling_weight >= 0))
+        refuse_value(fields.path("sampling_weight") + " must not be negative.");
+    if (spot && !(emitter.beam_width <= emitter.cutoff_angle && emitter.beam_width >= 0))
+        refuse_value(fields.path("beam_width") + " must be from 0 to the cut-off angle.");
+    if (area && emitter.shape == NONE)
+        refuse_value(fields.path("shape") + " must name the shape that glows.");
+    return emitter;
+}
+
+// Shapes cover the faces in order, and refer to their emitters as these refer to them.
+void check_shapes(const SceneData &scene) {
+    uint64_t next_face = 0;
+    for (size_t i = 0; i < scene.shapes.size(); ++i) {
+        const Shape &shape = scene.shapes[i];
+        const std::string name = numbered("shapes", i);
+        if (shape.first_face != next_face)
+            refuse_value(name + " must begin at face " + std::to_string(next_face) +
+                         ", where the one before it ends.");
+        next_face += shape.face_count;
+        if (next_face > scene.tree->triangles.size())
+            break;
+        if (shape.emitter != NONE &&
+            (scene.emitters[shape.emitter].type != EmitterType::area ||
+             scene.emitters[shape.emitter].shape != i))
+            refuse_value(name +
+                         " glows, but its emitter is not an area light of this shape.");
+    }
+    if (next_face != scene.tree->triangles.size())
+        refuse_value("shapes cover " + std::to_string(next_face) +
+                     " faces, but the tree has " +
+                     std::to_string(scene.tree->triangles.size()) + ".");
+    for (size_t i = 0; i < scene.emitters.size(); ++i) {
+        const Emitter &emitter = scene.emitters[i];
+        if (emitter.type != EmitterType::area)
+            continue;
+        if (scene.shapes[emitter.shape].emitter != i)
+            refuse_value(numbered("emitters", i) + " is not the emitter of its shape.");
+        if (scene.shapes[emitter.shape].face_count == 0)
+            refuse_value(numbered("emitters", i) + " glows on a shape without faces.");
+    }
+}
+
+void check_vertices(const SceneData &scene) {
+    if (!scene.faces.empty() && scene.faces.size() != scene.tree->triangles.size())
+        refuse_value("faces has " + std::to_string(scene.faces.size()) +
+                     " rows, but the tree has " +
+                     std::to_string(scene.tree->triangles.size()) + " triangles.");
+    for (const Shape &shape : scene.shapes) {
+        if (!shape.vertex_normals)
+            continue;
+        for (uint32_t i = shape.first_face; i < shape.first_face + shape.face_count; ++i)
+            for (const uint32_t vertex : scene.faces[i])
+                if (vertex >= scene.normals.size())
+                    refuse_value(numbered("faces", i) + " refers to normal " +
+                                 std::to_string(vertex) + ", but there are " +
+                                 std::to_string(scene.normals.size()) + ".");
+    }
+    for (size_t i = 0; i < scene.normals.size(); ++i)
+        if (!is_finite(scene.normals[i]))
+            refuse_value(numbered("normals", i) + " must be finite.");
+}
+
+SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
+                       const Array<float> &normals, const nb::list &shapes,
+                       const Array<float> &materials, const nb::list &emitters,
+                       const nb::dict &camera, const nb::dict &film, bool hide_emitters) {
+    SceneData scene;
+    scene.tree = tree.tree;
+    scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
+    scene.normals = rows<Vec3f>(normals, "normals");
+    scene.materials = materials_from(materials);
+    for (size_t i = 0; i < shapes.size(); ++i)
+        scene.shapes.push_back(
+            shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
+    double weights = 0;
+    for (size_t i = 0; i < emitters.size(); ++i) {
+        scene.emitters.push_back(
+            emitter_from(emitters[i], numbered("emitters", i), shapes.size()));
+        weights += scene.emitters.back().sampling_weight;
+    }
+    if (!scene.emitters.empty() && !(weights > 0))
+        refuse_value("emitters need a positive sum of their sampling weights.");
+    scene.camera = camera_from(camera);
+    scene.film = film_from(film);
+    scene.hide_emitters = hide_emitters;
+    check_shapes(scene);
+    check_vertices(scene);
+    return {std::make_shared<const PreparedScene>(std::move(scene))};
+}
+
+} // namespace
+
+Camera camera_from(nb::handle dict) {
+    Fields fields(dict, "camera");
+    Camera camera;
+    camera.origin = fields.vector("origin");
+    camera.axes = fields.vectors("axes");
+    camera.tan_half_fov_x = fields.number("tan_half_fov_x");
+    camera.near_clip = fields.number("near_clip");
+    camera.far_clip = fields.number("far_clip");
+    camera.principal_point_offset = fields.vector2("principal_point_offset", {});
+    fields.finish();
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            if (std::abs(dot(camera.axes[i], camera.axes[j]) - float(i == j)) > 1e-3f)
+                refuse_value("camera['axes'] must be orthogonal unit vectors.");
+    if (!(camera.tan_half_fov_x > 0))
+        refuse_value("camera['tan_half_fov_x'] must be positive.");
+    if (!(camera.near_clip >= 0 && camera.far_clip > camera.near_clip))
+        refuse_value(
+            "camera['far_clip'] must exceed camera['near_clip'], which must not be "
+            "negative.");
+    return camera;
+}
+
+Film film_from(nb::handle dict) {
+    constexpr uint32_t MAX_SIDE = 1u << 16; // the sampled rectangle is numbered in 32 bits
+    constexpr float MAX_RADIUS = 16;        // chosen: the footprint of a sample is 33 x 33
+    Fields fields(dict, "film");
+    Film film;
+    film.width = fields.integer("width", MAX_SIDE);
+    film.height = fields.integer("height", MAX_SIDE);
+    film.crop_x = fields.integer_or("crop_x", 0, MAX_SIDE);
+    film.crop_y = fields.integer_or("crop_y", 0, MAX_SIDE);
+    film.crop_width = fields.integer_or("crop_width", film.width, MAX_SIDE);
+    film.crop_height = fields.integer_or("crop_height", film.height, MAX_SIDE);
+    film.filter = fields.choice<FilterType>(
+        "filter", {{"box", FilterType::box}, {"gaussian", FilterType::gaussian}});
+    const bool box = film.filter == FilterType::box;
+    film.filter_radius =
+        box ? fields.number("filter_radius", 0.5f) : fields.number("filter_radius");
+    film.filter_stddev =
+        box ? fields.number("filter_stddev", 0.5f) : fields.number("filter_stddev");
+    film.sample_border = fields.boolean("sample_border", false);
+    fields.finish();
+    if (film.crop_width == 0 || film.crop_height == 0 ||
+        film.crop_x + film.crop_width > film.width ||
+        film.crop_y + film.crop_height > film.height)
+        refuse_value("film has an empty crop or one that exceeds its width and height.");
+    if (!(film.filter_radius > 0 && film.filter_radius <= MAX_RADIUS))
+        refuse_value("film['filter_radius'] must be positive and at most 16 pixels.");
+    if (!(film.filter_stddev > 0))
+        refuse_value("film['filter_stddev'] must be positive.");
+    return film;
+}
+
+void bind_scene(nb::module_ &m) {
+    nb::class_<SceneHandle>(
+        m, "Scene",
+        "A scene as the native renderer knows it: a tree and plain data, "
+        "read once and never changed.")
+        .def(
+            nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
+            nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"), nb::arg("camera"),
+            nb::arg("film"), nb::arg("hide_emitters") = false,
+            "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
+            "vertex normals. normals: float32 (V, 3) or (0, 3). shapes, emitters: lists of "
+            "dicts, camera, film: dicts; keys are the fields of the structs in "
+            "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
+            "Raises ValueError or TypeError for what does not fit together.");
+}
+
+} // namespace mlrt

@@ -1,0 +1,41 @@
+// The front door of the native renderer: a scene in, a picture out.
+#pragma once
+
+#include "mlrta/trace.h"
+#include "render/prepared_scene.h"
+#include "render/tile.h"
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+namespace mlrt {
+
+struct RenderSettings {
+    uint32_t samples_per_pixel = 1;
+    uint32_t seed = 0;
+    TraceOptions trace;
+    AovSet aovs;
+};
+
+// Row by row over the crop. An auxiliary picture that was not asked for is empty.
+struct RenderResult {
+    std::vector<float> image;  // red, green, blue
+    std::vector<float> depth;  // distance from the near plane along the ray; 0 for a miss
+    std::vector<float> normal; // shading normal, three a pixel; 0 for a miss
+    std::vector<int32_t>
+        primitive; // face that each pixel's first sample hit; -1 for a miss
+    RenderCounters counters;
+};
+
+// Depth and normal are filtered as the colours are, as in Mitsuba's `aov` integrator.
+//
+// The result depends, bit for bit, on the scene, the number of samples and the seed only.
+//
+// `cancelled`, if given, is asked now and then by the calling thread, with the share of the
+// work that is done; once it returns true the function returns false and the result is of
+// no use.
+bool render(const PreparedScene &scene, const RenderSettings &settings,
+            RenderResult &result, const std::function<bool(float done)> &cancelled = {});
+
+} // namespace mlrt

@@ -1,0 +1,113 @@
+// One work item of the renderer: the samples of a few neighbouring pixels, from camera rays
+// to colours. Everything it makes stays in buffers of its own, small enough for a core's
+// cache.
+#pragma once
+
+#include "base/counters.h"
+#include "mlrta/trace.h"
+#include "render/film_blocks.h"
+#include "render/prepared_scene.h"
+#include "render/sampler.h"
+#include "render/shadow.h"
+#include "render/surface.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace mlrt {
+
+struct AovSet {
+    bool depth = false;
+    bool normal = false;
+    bool primitive = false;
+};
+
+// Where each channel of the film lies; -1 if there is none.
+struct FilmChannels {
+    int depth = -1, normal = -1;
+    uint32_t count = 3; // red, green and blue come first
+
+    explicit FilmChannels(const AovSet &aovs) {
+        if (aovs.depth)
+            depth = int(count++);
+        if (aovs.normal) {
+            normal = int(count);
+            count += 3;
+        }
+    }
+};
+
+// What the tiles of a picture share and write to.
+struct TileTarget {
+    FilmBlocks &blocks;
+    FilmChannels channels;
+    int32_t *primitive =
+        nullptr; // of each pixel's first sample, if wanted: crop, row by row
+};
+
+struct RenderCounters {
+    Counters primary, shadow;
+};
+
+class TileRenderer {
+public:
+    TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
+                 const TraceOptions &options, TileTarget target)
+        : scene_(scene), streams_(streams), options_(options), target_(target),
+          shadow_tracer_(scene, options_, counters_.shadow) {}
+    TileRenderer(const TileRenderer &) = delete;
+    TileRenderer &operator=(const TileRenderer &) = delete;
+
+    struct Pixel {
+        uint32_t column = 0, row = 0; // of the sampled rectangle
+    };
+
+    // Renders samples [first, first + count) of each pixel, in the order of the pixels.
+    void render(const std::vector<Pixel> &pixels, uint32_t first_sample,
+                uint32_t sample_count);
+
+    const RenderCounters &counters() const { return counters_; }
+
+private:
+    // Arrays of one float a ray, in the order of pixels and, within each, of samples.
+    struct Rays {
+        std::vector<float> film_x, film_y, light_x, light_y;
+        std::vector<float> direction[3], t_min, t_max;
+        std::vector<float> t;
+        std::vector<uint32_t> primitive;
+        std::vector<float> values; // FilmChannels::count a ray
+
+        void resize(size_t count, size_t channels);
+    };
+
+    // A camera ray that goes on behind an emitter that is to be hidden.
+    struct PassingRay {
+        uint32_t ray;
+        Vec3f origin;
+    };
+
+    void generate(const std::vector<Pixel> &pixels, uint32_t first_sample,
+                  uint32_t sample_count);
+    void trace_camera_rays();
+    void shade_hits();
+    void shade(uint32_t ray, const SurfacePoint &point);
+    void pass_hidden_emitters();
+    void write(const std::vector<Pixel> &pixels, uint32_t first_sample,
+               uint32_t sample_count);
+
+    Vec3f direction(uint32_t ray) const {
+        return {rays_.direction[0][ray], rays_.direction[1][ray], rays_.direction[2][ray]};
+    }
+
+    const PreparedScene &scene_;
+    const SampleStreams &streams_;
+    TraceOptions options_;
+    TileTarget target_;
+    RenderCounters counters_;
+    ShadowTracer shadow_tracer_;
+    Rays rays_;
+    std::vector<ShadowCandidate> candidates_;
+    std::vector<PassingRay> passing_;
+};
+
+} // namespace mlrt

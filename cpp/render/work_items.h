@@ -1,0 +1,52 @@
+// How the pixels of a picture are dealt to work items and traced in groups.
+#pragma once
+
+#include "render/film_blocks.h"
+#include "render/tile.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+namespace mlrt {
+
+// The sampled rectangle is cut into squares whose side is a power of two. Pixels of a
+// square are taken in Morton order and cut into groups of up to about `rays_per_group`
+// rays: all samples of some pixels, or, if one pixel has more samples than that, some
+// samples of one pixel.
+//
+// A square is never smaller than a block of the film, and groups come in Morton order, so
+// each block's samples come in the same order whatever the size of a group is.
+class WorkItems {
+public:
+    WorkItems(const PixelRect &sampled, uint32_t samples_per_pixel,
+              uint32_t rays_per_group);
+
+    uint32_t count() const { return across_ * down_; }
+
+    // Calls visit(pixels, first_sample, sample_count) for each group of an item, in order.
+    template <typename Visit>
+    void for_each_group(uint32_t item, Visit &&visit) const {
+        std::vector<TileRenderer::Pixel> pixels;
+        for (uint32_t code = 0; code < side_ * side_; code += group_pixels_) {
+            collect_pixels(item, code, pixels);
+            if (pixels.empty())
+                continue;
+            for (uint32_t first = 0; first < samples_; first += group_samples_)
+                visit(pixels, first, std::min(group_samples_, samples_ - first));
+        }
+    }
+
+private:
+    void collect_pixels(uint32_t item, uint32_t first_code,
+                        std::vector<TileRenderer::Pixel> &pixels) const;
+
+    uint32_t width_, height_;
+    uint32_t samples_;
+    uint32_t group_pixels_ = 1;  // a power of four
+    uint32_t group_samples_ = 1; // fewer than samples_ only if group_pixels_ is 1
+    uint32_t side_ = FilmBlocks::BLOCK_SIZE;
+    uint32_t across_ = 0, down_ = 0;
+};
+
+} // namespace mlrt

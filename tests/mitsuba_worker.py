@@ -1,0 +1,130 @@
+"""Renders reference pictures with Mitsuba's llvm_ad_rgb, in a process of its own.
+
+Dr.Jit looks for libLLVM once, when it is imported, and the tests have imported it long before.
+Run as a script it reads one job a line from standard input (JSON: the name of a function below
+and its arguments) and answers each with the path of a .npy file.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+READY = "ready"
+
+
+class Unavailable(Exception):
+    """There is no libLLVM that Mitsuba could use; the message says why."""
+
+
+class MitsubaWorker:
+    """The other end: starts the process and hands it jobs."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, __file__, str(folder)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        greeting = self._pipe(self.process.stdout).readline().strip()
+        if greeting != READY:
+            self.close()
+            raise Unavailable(greeting or "the process ended before it was ready")
+
+    def __call__(self, function: str, **arguments: Any) -> npt.NDArray[Any]:
+        stdin = self._pipe(self.process.stdin)
+        stdin.write(json.dumps([function, arguments]) + "\n")
+        stdin.flush()
+        answer = self._pipe(self.process.stdout).readline().strip()
+        if not answer.endswith(".npy"):
+            raise RuntimeError(f"Mitsuba could not do {function}({arguments}): {answer}")
+        result: npt.NDArray[Any] = np.load(answer)
+        return result
+
+    def close(self) -> None:
+        for pipe in (self.process.stdin, self.process.stdout):
+            self._pipe(pipe).close()
+        self.process.wait()
+
+    @staticmethod
+    def _pipe(pipe: IO[str] | None) -> IO[str]:
+        assert pipe is not None
+        return pipe
+
+
+def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any:
+    """The picture of ``direct`` with one emitter sample; with ``aovs``, that of ``aov``."""
+    import mitsuba as mi
+    import render_scenes
+
+    integrator: dict[str, Any] = {
+        "type": "direct",
+        "emitter_samples": 1,
+        "bsdf_samples": 0,
+        "hide_emitters": options.get("hide_emitters", False),
+    }
+    if "aovs" in options:
+        integrator = {"type": "aov", "aovs": options["aovs"]}
+    # Merging meshes would make the order of emitters differ from run to run.
+    loaded = mi.load_dict(render_scenes.SCENES[scene](folder), optimize=False)
+    return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
+
+
+def sampler(folder: Path, seed: int, samples: int, size: int, dimensions: int) -> Any:
+    """Numbers of the sampler ``independent``: shape (size, dimensions)."""
+    import mitsuba as mi
+
+    independent = mi.load_dict({"type": "independent", "sample_count": samples})
+    independent.set_samples_per_wavefront(samples)
+    independent.seed(seed, size)
+    return np.stack([np.array(independent.next_1d()) for _ in range(dimensions)], axis=1)
+
+
+def image_block(
+    folder: Path, filter: dict[str, Any], size: list[int], offset: list[int], samples: Any
+) -> Any:
+    """Weighted sums and weights, shape (H, W, 2), of rows x, y, value."""
+    import mitsuba as mi
+
+    block = mi.ImageBlock(size, offset, 2, rfilter=mi.load_dict(filter), border=False)
+    columns = np.array(samples, np.float32).T.copy()
+    x, y, value = (mi.Float(column.copy()) for column in columns)
+    block.put(mi.Point2f(x, y), [value, mi.Float(1)])
+    return block.tensor()
+
+
+def main(folder: Path) -> None:
+    from mlrt_compare import llvm
+
+    answers = sys.stdout
+    sys.stdout = sys.stderr
+    try:
+        llvm.activate()
+        import mitsuba as mi
+
+        mi.set_variant("llvm_ad_rgb")
+    except (llvm.LlvmUnavailable, ImportError) as error:
+        print(" ".join(str(error).split()), file=answers, flush=True)
+        return
+    print(READY, file=answers, flush=True)
+    functions = {"render": render, "sampler": sampler, "image_block": image_block}
+    for number, line in enumerate(sys.stdin):
+        name, arguments = json.loads(line)
+        path = folder / f"reference-{number}.npy"
+        try:
+            np.save(path, np.array(functions[name](folder, **arguments)))
+            print(path, file=answers, flush=True)
+        except Exception as error:
+            print(" ".join(str(error).split()) or repr(error), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

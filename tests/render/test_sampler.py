@@ -1,0 +1,74 @@
+"""The stream of random numbers equals that of Mitsuba's `independent`, bit for bit."""
+
+from __future__ import annotations
+
+import mitsuba as mi
+import numpy as np
+import numpy.typing as npt
+import pytest
+from mitsuba_worker import MitsubaWorker
+
+from mlrt_plugin._dispatch import core
+
+DIMENSIONS = 6
+
+
+def own_stream(seed: int, pixels: int, samples: int) -> npt.NDArray[np.float32]:
+    """Every sample of every pixel, in the order of Mitsuba's wavefront."""
+    stream = core.render_selftest.sampler_stream
+    return np.array(
+        [
+            stream(seed, pixels, samples, pixel, sample, DIMENSIONS)
+            for pixel in range(pixels)
+            for sample in range(samples)
+        ],
+        np.float32,
+    )
+
+
+@pytest.mark.parametrize(("seed", "samples"), [(0, 1), (7, 3), (0xFFFFFFFF, 4)])
+def test_against_scalar_pcg32_and_tea(seed: int, samples: int) -> None:
+    pixels = 50
+    expected = []
+    for index in range(pixels * samples):
+        state, stream = mi.sample_tea_32(seed, index)
+        random = mi.PCG32(1, state, stream)
+        expected.append([random.next_float32() for _ in range(DIMENSIONS)])
+    np.testing.assert_array_equal(
+        own_stream(seed, pixels, samples), np.array(expected, np.float32)
+    )
+
+
+@pytest.mark.parametrize(("seed", "samples"), [(0, 1), (123, 5)])
+def test_against_the_sampler_itself(
+    mitsuba_llvm: MitsubaWorker, seed: int, samples: int
+) -> None:
+    pixels = 200
+    expected = mitsuba_llvm(
+        "sampler", seed=seed, samples=samples, size=pixels * samples, dimensions=DIMENSIONS
+    )
+    np.testing.assert_array_equal(own_stream(seed, pixels, samples), expected)
+
+
+def test_first_pass_of_a_picture_beyond_32_bits() -> None:
+    # 2^20 pixels of 2^13 samples: Mitsuba renders three passes of 2730 samples.
+    pixels, samples, per_pass = 1 << 20, 1 << 13, 2730
+    for pixel, sample in [(0, 0), (5, 2729), (1_048_575, 17)]:
+        state, stream = mi.sample_tea_32(3, pixel * per_pass + sample)
+        random = mi.PCG32(1, state, stream)
+        expected = [np.float32(random.next_float32()) for _ in range(DIMENSIONS)]
+        own = core.render_selftest.sampler_stream(
+            3, pixels, samples, pixel, sample, DIMENSIONS
+        )
+        assert own == expected
+
+
+def test_later_passes_have_streams_of_their_own() -> None:
+    pixels, samples, per_pass = 1 << 20, 1 << 13, 2730
+
+    def stream(sample: int) -> tuple[float, ...]:
+        return tuple(
+            core.render_selftest.sampler_stream(0, pixels, samples, 4, sample, DIMENSIONS)
+        )
+
+    assert len({stream(1), stream(per_pass + 1), stream(2 * per_pass + 1)}) == 3
