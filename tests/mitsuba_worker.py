@@ -1,8 +1,8 @@
 """Renders reference pictures with Mitsuba's llvm_ad_rgb, in a process of its own.
 
-Dr.Jit looks for libLLVM once, when it is imported, and the tests have imported it long before.
-Run as a script it reads one job a line from standard input (JSON: the name of a function below
-and its arguments) and answers each with the path of a .npy file.
+Dr.Jit looks for libLLVM once, when it is imported, and tests have imported it long before.
+Run as a script it reads jobs from standard input, one a line (JSON: the name of a function
+below and its arguments), and answers each with the path of a .npy file.
 """
 
 from __future__ import annotations

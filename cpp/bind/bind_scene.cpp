@@ -218,8 +218,9 @@ Camera camera_from(nb::handle dict) {
 }
 
 Film film_from(nb::handle dict) {
-    constexpr uint32_t MAX_SIDE = 1u << 16; // the sampled rectangle is numbered in 32 bits
-    constexpr float MAX_RADIUS = 16;        // chosen: the footprint of a sample is 33 x 33
+    constexpr uint32_t MAX_SIDE = 1u << 16;
+    constexpr uint64_t MAX_PIXELS = 1ull << 31; // they are numbered in 32 bits
+    constexpr float MAX_RADIUS = 16; // chosen: the footprint of a sample is 33 x 33
     Fields fields(dict, "film");
     Film film;
     film.width = fields.integer("width", MAX_SIDE);
@@ -245,6 +246,9 @@ Film film_from(nb::handle dict) {
         refuse_value("film['filter_radius'] must be positive and at most 16 pixels.");
     if (!(film.filter_stddev > 0))
         refuse_value("film['filter_stddev'] must be positive.");
+    const PixelRect sampled = sampled_pixels(film, ReconstructionFilter(film));
+    if (uint64_t(sampled.width) * sampled.height > MAX_PIXELS)
+        refuse_value("film has more than 2^31 pixels to sample; render it crop by crop.");
     return film;
 }
 

@@ -51,11 +51,13 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
                             settings.aovs.primitive ? result.primitive.data() : nullptr};
 
     std::mutex counters_mutex;
-    std::atomic<uint32_t> items_done{0};
+    const double all_samples =
+        double(sampled.width) * sampled.height * settings.samples_per_pixel;
+    std::atomic<uint64_t> samples_done{0};
     std::atomic<bool> stop{false};
     const auto ask = [&] {
-        if (cancelled && cancelled(float(items_done.load(std::memory_order_relaxed)) /
-                                   float(items.count())))
+        const uint64_t done = samples_done.load(std::memory_order_relaxed);
+        if (cancelled && cancelled(float(double(done) / all_samples)))
             stop.store(true, std::memory_order_relaxed);
         return stop.load(std::memory_order_relaxed);
     };
@@ -66,15 +68,15 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
         items.for_each_group(item, [&](const std::vector<TileRenderer::Pixel> &pixels,
                                        uint32_t first_sample, uint32_t sample_count) {
             // An item with many samples takes long: ask before each of its groups.
-            if (may_ask ? !ask() : !stop.load(std::memory_order_relaxed))
-                tile.render(pixels, first_sample, sample_count);
+            if (may_ask ? ask() : stop.load(std::memory_order_relaxed))
+                return;
+            tile.render(pixels, first_sample, sample_count);
+            samples_done.fetch_add(uint64_t(pixels.size()) * sample_count,
+                                   std::memory_order_relaxed);
         });
-        {
-            const std::lock_guard lock(counters_mutex);
-            result.counters.primary += tile.counters().primary;
-            result.counters.shadow += tile.counters().shadow;
-        }
-        items_done.fetch_add(1, std::memory_order_relaxed);
+        const std::lock_guard lock(counters_mutex);
+        result.counters.primary += tile.counters().primary;
+        result.counters.shadow += tile.counters().shadow;
     };
     if (!parallel_for(items.count(), render_item, ask) || stop)
         return false;

@@ -30,7 +30,7 @@ def test_samples_equal_those_of_the_scene(folder: Path, name: str) -> None:
         ds, spectrum = theirs.sample_emitter_direction(interaction, [x, y], False)
         weight = np.array(spectrum)
         sample = core.render_selftest.sample_emitter(own, p, x, y)
-        # Absolutely too: cosines and the angle of a fall-off are differences, and the choice
+        # Absolutely too: cosines and the angle of a fall-off are differences; the choice
         # of a face magnifies the rounding of what is left of a random number.
         np.testing.assert_allclose(sample["weight"], weight, rtol=2e-4, atol=1e-4)
         if not weight.any():

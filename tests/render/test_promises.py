@@ -91,7 +91,7 @@ def test_black_and_unlit_points_send_no_shadow_rays(folder: Path) -> None:
 def test_progress_grows(folder: Path) -> None:
     scene = core_scene(render_scenes.SCENES["point"](folder))
     seen: list[float] = []
-    core.render(scene, 3000, 0, {}, [], seen.append)
+    core.render(scene, 1000, 0, {}, [], seen.append)
     assert len(seen) > 1
     assert seen == sorted(seen)
     assert min(seen) >= 0 and max(seen) <= 1

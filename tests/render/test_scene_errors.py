@@ -117,6 +117,27 @@ BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
 }
 
 
+def test_too_many_pixels(folder: Path) -> None:
+    arguments = scene_arguments(render_scenes.SCENES["point"](folder))
+    arguments["film"] = {"width": 65536, "height": 65536, "filter": "box"}
+    with pytest.raises(ValueError, match=r"2\^31 pixels"):
+        core.Scene(**arguments)
+
+
+def test_a_scene_without_faces_is_black(folder: Path) -> None:
+    arguments = scene_arguments(render_scenes.SCENES["directional"](folder))
+    none = np.zeros((0, 3), np.uint32)
+    arguments |= {
+        "tree": core.KdTree(np.zeros((0, 3), np.float32), none),
+        "faces": none,
+        "shapes": [],
+    }
+    answer = core.render(core.Scene(**arguments), 2, 0, {}, ["depth", "prim"])
+    assert not answer["image"].any()
+    assert not answer["aovs"]["depth"].any()
+    assert (answer["aovs"]["prim"] == -1).all()
+
+
 @pytest.mark.parametrize("name", BAD)
 def test_bad_scene(folder: Path, name: str) -> None:
     change, error, message = BAD[name]
