@@ -18,6 +18,21 @@ namespace mlrt {
 
 namespace {
 
+constexpr const char *RENDER_DOCSTRING =
+    R"(Renders direct light with one emitter sample a camera sample.
+
+options: fields of TraceOptions (mlrta/trace.h), names of enumerators as str; they never
+change the picture.
+aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
+'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
+'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss).
+progress: called as progress(done), done from 0 to 1, on the calling thread and at most
+about ten times a second.
+
+Returns a dict: image float32 (H, W, 3) over the film's crop, aovs, counters (fields of
+Counters, base/counters.h, after 'primary_' and 'shadow_'), seconds. Raises ValueError or
+TypeError for bad arguments, KeyboardInterrupt on Ctrl-C, and whatever progress raises.)";
+
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) {
@@ -121,8 +136,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     if (settings.aovs.primitive)
         pictures["prim"] = to_numpy(std::move(result.primitive), {height, width});
     nb::dict counters;
-    counters["primary"] = counters_to_dict(result.counters.primary);
-    counters["shadow"] = counters_to_dict(result.counters.shadow);
+    add_counters(counters, "primary_", result.counters.primary);
+    add_counters(counters, "shadow_", result.counters.shadow);
     nb::dict answer;
     answer["image"] = to_numpy(std::move(result.image), {height, width, 3});
     answer["aovs"] = pictures;
@@ -134,24 +149,9 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
 } // namespace
 
 void bind_render(nb::module_ &m) {
-    m.def(
-        "render", &render_scene, nb::arg("scene"), nb::arg("spp"), nb::arg("seed") = 0,
-        nb::arg("options") = nb::dict(), nb::arg("aovs") = std::vector<std::string>(),
-        nb::arg("progress") = nb::none(),
-        "Renders direct light with one emitter sample a camera sample.\n\n"
-        "options: fields of TraceOptions (see mlrta/trace.h), names of enumerators as str; "
-        "they never change the picture. aovs: names among 'depth' (distance from the near "
-        "plane, 0 for a miss), 'normal' (shading normal), both filtered like the colours, "
-        "and "
-        "'prim' (int32: face that each pixel's first sample hit, -1 for a miss). progress: "
-        "called as progress(done) with done in [0, 1] from the calling thread, at most "
-        "about "
-        "ten times a second.\n\n"
-        "Returns a dict: image float32 (H, W, 3), aovs, counters (of 'primary' and "
-        "'shadow' "
-        "rays), seconds. Raises ValueError for bad arguments, KeyboardInterrupt on Ctrl-C "
-        "and "
-        "whatever progress raises.");
+    m.def("render", &render_scene, nb::arg("scene"), nb::arg("spp"), nb::arg("seed") = 0,
+          nb::arg("options") = nb::dict(), nb::arg("aovs") = std::vector<std::string>(),
+          nb::arg("progress") = nb::none(), RENDER_DOCSTRING);
 }
 
 } // namespace mlrt

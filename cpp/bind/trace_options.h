@@ -43,19 +43,22 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
     return options;
 }
 
-inline nanobind::dict counters_to_dict(const Counters &counters) {
-    nanobind::dict dict;
-    dict["rays"] = counters.rays;
-    dict["packets"] = counters.packets;
-    dict["entry_steps"] = counters.entry_steps;
-    dict["traversal_steps"] = counters.traversal_steps;
-    dict["leaf_visits"] = counters.leaf_visits;
-    dict["triangle_tests"] = counters.triangle_tests;
-    dict["double_tests"] = counters.double_tests;
-    dict["exact_tests"] = counters.exact_tests;
-    dict["tiles"] = counters.tiles;
-    dict["missed_tiles"] = counters.missed_tiles;
-    return dict;
+// Adds the counters to a dict; their keys are the names of the fields after a prefix.
+inline void add_counters(nanobind::dict dict, const std::string &prefix,
+                         const Counters &counters) {
+    const auto add = [&](const char *name, uint64_t value) {
+        dict[(prefix + name).c_str()] = value;
+    };
+    add("rays", counters.rays);
+    add("packets", counters.packets);
+    add("entry_steps", counters.entry_steps);
+    add("traversal_steps", counters.traversal_steps);
+    add("leaf_visits", counters.leaf_visits);
+    add("triangle_tests", counters.triangle_tests);
+    add("double_tests", counters.double_tests);
+    add("exact_tests", counters.exact_tests);
+    add("tiles", counters.tiles);
+    add("missed_tiles", counters.missed_tiles);
 }
 
 } // namespace mlrt

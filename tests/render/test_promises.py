@@ -75,8 +75,8 @@ def test_pictures_depend_on_the_seed(folder: Path) -> None:
 def test_every_ray_is_counted(folder: Path) -> None:
     scene = core_scene(render_scenes.SCENES["point"](folder))
     counters = core.render(scene, 3)["counters"]
-    assert counters["primary"]["rays"] == 64 * 48 * 3
-    assert 0 < counters["shadow"]["rays"] < 64 * 48 * 3
+    assert counters["primary_rays"] == 64 * 48 * 3
+    assert 0 < counters["shadow_rays"] < 64 * 48 * 3
 
 
 def test_black_and_unlit_points_send_no_shadow_rays(folder: Path) -> None:
@@ -84,7 +84,7 @@ def test_black_and_unlit_points_send_no_shadow_rays(folder: Path) -> None:
     for child in ("floor", "wall", "cube", "ball"):
         description[child]["bsdf"] = render_scenes.diffuse(0, 0, 0)
     answer = core.render(core_scene(description), 1)
-    assert answer["counters"]["shadow"]["rays"] == 0
+    assert answer["counters"]["shadow_rays"] == 0
     assert not answer["image"].any()
 
 
