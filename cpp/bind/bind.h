@@ -8,6 +8,9 @@ namespace mlrt {
 void bind_kdtree_selftest(nanobind::module_ &m);
 void bind_mlrta_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);
+void bind_render(nanobind::module_ &m);
+void bind_render_selftest(nanobind::module_ &m);
+void bind_scene(nanobind::module_ &m);
 void bind_tree(nanobind::module_ &m);
 
 } // namespace mlrt

@@ -35,7 +35,7 @@ std::array<T, 3> array(Vec3<T> v) {
 
 std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t samples,
                                   uint32_t pixel, uint32_t sample, uint32_t dimensions) {
-    Pcg32 random = SampleStreams(seed, pixel_count, samples).stream(pixel, sample);
+    Pcg32 random = SampleStreams(seed, pixel_count, samples).stream(pixel, sample).open();
     std::vector<float> numbers(dimensions);
     for (float &number : numbers)
         number = random.next_float();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <utility>
 
@@ -67,16 +68,45 @@ public:
         }
     }
 
-    Pcg32 stream(uint32_t pixel, uint32_t sample) const {
+    struct Stream {
+        uint32_t seed, index;
+
+        Pcg32 open() const {
+            const auto [state, sequence] = sample_tea_32(seed, index);
+            return Pcg32(state, sequence);
+        }
+    };
+
+    Stream stream(uint32_t pixel, uint32_t sample) const {
         const uint32_t pass = sample / samples_per_pass_;
-        const uint32_t index = pixel * samples_per_pass_ + sample % samples_per_pass_;
-        const auto [state, sequence] = sample_tea_32(seed_ + pass * 0x9e3779b9u, index);
-        return Pcg32(state, sequence);
+        return {seed_ + pass * 0x9e3779b9u,
+                pixel * samples_per_pass_ + sample % samples_per_pass_};
     }
 
 private:
     uint32_t seed_;
     uint32_t samples_per_pass_;
 };
+
+// The first two pairs of numbers of each stream: where in its pixel a sample lies, and
+// which point of which light it takes. The loop has no branches, so compilers make vector
+// code of it.
+struct SampleNumbers {
+    float *pixel_x, *pixel_y, *light_x, *light_y;
+};
+
+inline void draw_numbers(const uint32_t *__restrict seeds,
+                         const uint32_t *__restrict indices, size_t count,
+                         SampleNumbers numbers) {
+    float *__restrict pixel_x = numbers.pixel_x, *__restrict pixel_y = numbers.pixel_y;
+    float *__restrict light_x = numbers.light_x, *__restrict light_y = numbers.light_y;
+    for (size_t i = 0; i < count; ++i) {
+        Pcg32 random = SampleStreams::Stream{seeds[i], indices[i]}.open();
+        pixel_x[i] = random.next_float();
+        pixel_y[i] = random.next_float();
+        light_x[i] = random.next_float();
+        light_y[i] = random.next_float();
+    }
+}
 
 } // namespace mlrt

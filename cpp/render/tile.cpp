@@ -23,7 +23,8 @@ void TileRenderer::Rays::resize(size_t count, size_t channels) {
     for (std::vector<float> *array : {&film_x, &film_y, &light_x, &light_y, &t_min, &t_max,
                                       &t, &direction[0], &direction[1], &direction[2]})
         array->resize(count);
-    primitive.resize(count);
+    for (std::vector<uint32_t> *array : {&stream_seed, &stream_index, &primitive})
+        array->resize(count);
     values.assign(count * channels, 0.0f);
 }
 
@@ -47,20 +48,33 @@ void TileRenderer::render(const std::vector<Pixel> &pixels, uint32_t first_sampl
 void TileRenderer::generate(const std::vector<Pixel> &pixels, uint32_t first_sample,
                             uint32_t sample_count) {
     const PixelRect &sampled = target_.blocks.sampled();
+    const size_t count = rays_.t.size();
     size_t ray = 0;
     for (const Pixel &pixel : pixels) {
         const uint32_t number = pixel.row * sampled.width + pixel.column;
         for (uint32_t i = 0; i < sample_count; ++i, ++ray) {
-            Pcg32 random = streams_.stream(number, first_sample + i);
-            rays_.film_x[ray] = float(sampled.x + int(pixel.column)) + random.next_float();
-            rays_.film_y[ray] = float(sampled.y + int(pixel.row)) + random.next_float();
-            // Drawn for rays that hit nothing too: a stream serves one ray only.
-            rays_.light_x[ray] = random.next_float();
-            rays_.light_y[ray] = random.next_float();
-            const Vec3f d = scene_.plane.direction(rays_.film_x[ray], rays_.film_y[ray]);
-            for (int k = 0; k < 3; ++k)
-                rays_.direction[k][ray] = d[k];
+            const SampleStreams::Stream stream = streams_.stream(number, first_sample + i);
+            rays_.stream_seed[ray] = stream.seed;
+            rays_.stream_index[ray] = stream.index;
         }
+    }
+    // Numbers for a light are drawn for rays that hit nothing too: a stream serves one ray.
+    draw_numbers(rays_.stream_seed.data(), rays_.stream_index.data(), count,
+                 {rays_.film_x.data(), rays_.film_y.data(), rays_.light_x.data(),
+                  rays_.light_y.data()});
+    ray = 0;
+    for (const Pixel &pixel : pixels) {
+        const float x = float(sampled.x + int(pixel.column));
+        const float y = float(sampled.y + int(pixel.row));
+        for (uint32_t i = 0; i < sample_count; ++i, ++ray) {
+            rays_.film_x[ray] += x;
+            rays_.film_y[ray] += y;
+        }
+    }
+    for (ray = 0; ray < count; ++ray) {
+        const Vec3f d = scene_.plane.direction(rays_.film_x[ray], rays_.film_y[ray]);
+        for (int k = 0; k < 3; ++k)
+            rays_.direction[k][ray] = d[k];
     }
     std::fill(rays_.t_min.begin(), rays_.t_min.end(), scene_.plane.near_clip);
     std::fill(rays_.t_max.begin(), rays_.t_max.end(), scene_.plane.far_clip);

@@ -69,8 +69,9 @@ public:
     const RenderCounters &counters() const { return counters_; }
 
 private:
-    // Arrays of one float a ray, in the order of pixels and, within each, of samples.
+    // Arrays of one entry a ray, in the order of pixels and, within each, of samples.
     struct Rays {
+        std::vector<uint32_t> stream_seed, stream_index;
         std::vector<float> film_x, film_y, light_x, light_y;
         std::vector<float> direction[3], t_min, t_max;
         std::vector<float> t;
