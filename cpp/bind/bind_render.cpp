@@ -136,8 +136,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     if (settings.aovs.primitive)
         pictures["prim"] = to_numpy(std::move(result.primitive), {height, width});
     nb::dict counters;
-    add_counters(counters, "primary_", result.counters.primary);
-    add_counters(counters, "shadow_", result.counters.shadow);
+    counters.update(counters_to_dict(result.counters.primary, "primary_"));
+    counters.update(counters_to_dict(result.counters.shadow, "shadow_"));
     nb::dict answer;
     answer["image"] = to_numpy(std::move(result.image), {height, width, 3});
     answer["aovs"] = pictures;

@@ -43,9 +43,10 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
     return options;
 }
 
-// Adds the counters to a dict; their keys are the names of the fields after a prefix.
-inline void add_counters(nanobind::dict dict, const std::string &prefix,
-                         const Counters &counters) {
+// Keys are the names of the fields after a prefix.
+inline nanobind::dict counters_to_dict(const Counters &counters,
+                                       const std::string &prefix = "") {
+    nanobind::dict dict;
     const auto add = [&](const char *name, uint64_t value) {
         dict[(prefix + name).c_str()] = value;
     };
@@ -59,6 +60,7 @@ inline void add_counters(nanobind::dict dict, const std::string &prefix,
     add("exact_tests", counters.exact_tests);
     add("tiles", counters.tiles);
     add("missed_tiles", counters.missed_tiles);
+    return dict;
 }
 
 } // namespace mlrt

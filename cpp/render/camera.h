@@ -1,6 +1,7 @@
 // Rays of a pinhole camera as an affine map of the film.
 #pragma once
 
+#include "mlrta/beam.h"
 #include "render/scene.h"
 
 #include <cmath>
@@ -11,15 +12,15 @@ namespace mlrt {
 //   origin + t * (d0 + x * dx + y * dy)
 // with a direction whose component along the camera's z is 1. So t is the depth along z,
 // all rays share origin and interval, and a rectangle of the film is a rectangle of
-// directions. That is what beams are made of: they take the map in double precision.
+// directions. That is what beams are made of.
 struct ImagePlane {
     Vec3f origin{};
     Vec3d d0{}, dx{}, dy{};
-    Vec3f d0_single{}, dx_single{}, dy_single{};
+    CameraMap single; // the same map in single precision, which makes the rays
     float near_clip = 0, far_clip = 0;
 
     Vec3f direction(float x, float y) const {
-        return d0_single + (x * dx_single + y * dy_single);
+        return (single.base + x * single.dx) + y * single.dy;
     }
 };
 
@@ -37,9 +38,7 @@ inline ImagePlane image_plane(const Camera &camera, const Film &film) {
     plane.d0 = z_axis + (shift_x * tan_x) * x_axis + (shift_y * tan_y) * y_axis;
     plane.dx = (-2 * tan_x / film.width) * x_axis;
     plane.dy = (-2 * tan_y / film.height) * y_axis;
-    plane.d0_single = Vec3f(plane.d0);
-    plane.dx_single = Vec3f(plane.dx);
-    plane.dy_single = Vec3f(plane.dy);
+    plane.single = {camera.origin, Vec3f(plane.d0), Vec3f(plane.dx), Vec3f(plane.dy)};
     plane.near_clip = camera.near_clip;
     plane.far_clip = camera.far_clip;
     return plane;

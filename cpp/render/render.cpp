@@ -65,13 +65,12 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     const auto render_item = [&](uint32_t item) {
         TileRenderer tile(scene, streams, settings.trace, target);
         const bool may_ask = std::this_thread::get_id() == caller;
-        items.for_each_group(item, [&](const std::vector<TileRenderer::Pixel> &pixels,
-                                       uint32_t first_sample, uint32_t sample_count) {
+        items.for_each_group(item, [&](const PixelGroup &group) {
             // An item with many samples takes long: ask before each of its groups.
             if (may_ask ? ask() : stop.load(std::memory_order_relaxed))
                 return;
-            tile.render(pixels, first_sample, sample_count);
-            samples_done.fetch_add(uint64_t(pixels.size()) * sample_count,
+            tile.render(group);
+            samples_done.fetch_add(uint64_t(group.pixels.size()) * group.sample_count,
                                    std::memory_order_relaxed);
         });
         const std::lock_guard lock(counters_mutex);

@@ -1,7 +1,5 @@
 #include "render/surface.h"
 
-#include <algorithm>
-
 namespace mlrt {
 
 namespace {
@@ -14,29 +12,14 @@ Vec3f interpolate(Vec3f a, Vec3f b, Vec3f c, float wa, float wb, float wc) {
 
 } // namespace
 
-Barycentrics hit_barycentrics(Vec3f origin, Vec3f direction, const Triangle &triangle) {
-    const Vec3d a(triangle.a), d(direction);
-    const Vec3d e1 = Vec3d(triangle.b) - a, e2 = Vec3d(triangle.c) - a;
-    const Vec3d s = Vec3d(origin) - a;
-    const Vec3d d_e2 = cross(d, e2);
-    const double determinant = dot(e1, d_e2);
-    // A ray in the triangle's plane: any point of it will do, and the first vertex is one.
-    if (determinant == 0)
-        return {};
-    const double u = std::clamp(dot(s, d_e2) / determinant, 0.0, 1.0);
-    const double v = std::clamp(dot(d, cross(s, e1)) / determinant, 0.0, 1.0 - u);
-    return {float(u), float(v)};
-}
-
 // Mitsuba 3.9's mesh.cpp, compute_surface_interaction.
-SurfacePoint surface_point(const PreparedScene &scene, uint32_t primitive,
-                           Barycentrics at) {
+SurfacePoint surface_point(const PreparedScene &scene, uint32_t primitive, Vec2f at) {
     const Triangle &triangle = scene.data.tree->triangles[primitive];
     SurfacePoint point;
     point.shape = scene.shape_of_face[primitive];
     const Shape &shape = scene.data.shapes[point.shape];
 
-    const float w1 = at.u, w2 = at.v, w0 = 1.0f - w1 - w2;
+    const float w1 = at.x, w2 = at.y, w0 = 1.0f - w1 - w2;
     point.p = interpolate(triangle.a, triangle.b, triangle.c, w0, w1, w2);
 
     // In double precision, where the product of tiny edges does not vanish.

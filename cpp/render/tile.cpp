@@ -28,13 +28,12 @@ void TileRenderer::Rays::resize(size_t count, size_t channels) {
     values.assign(count * channels, 0.0f);
 }
 
-void TileRenderer::render(const std::vector<Pixel> &pixels, uint32_t first_sample,
-                          uint32_t sample_count) {
-    rays_.resize(pixels.size() * sample_count, target_.channels.count);
+void TileRenderer::render(const PixelGroup &group) {
+    rays_.resize(group.pixels.size() * group.sample_count, target_.channels.count);
     candidates_.clear();
     passing_.clear();
-    generate(pixels, first_sample, sample_count);
-    trace_camera_rays();
+    generate(group);
+    trace_camera_rays(group);
     shade_hits();
     pass_hidden_emitters();
     shadow_tracer_.trace(candidates_, [&](const ShadowCandidate &candidate) {
@@ -42,18 +41,18 @@ void TileRenderer::render(const std::vector<Pixel> &pixels, uint32_t first_sampl
         for (int k = 0; k < 3; ++k)
             values[k] += candidate.contribution[k];
     });
-    write(pixels, first_sample, sample_count);
+    write(group);
 }
 
-void TileRenderer::generate(const std::vector<Pixel> &pixels, uint32_t first_sample,
-                            uint32_t sample_count) {
+void TileRenderer::generate(const PixelGroup &group) {
     const PixelRect &sampled = target_.blocks.sampled();
     const size_t count = rays_.t.size();
     size_t ray = 0;
-    for (const Pixel &pixel : pixels) {
+    for (const Pixel &pixel : group.pixels) {
         const uint32_t number = pixel.row * sampled.width + pixel.column;
-        for (uint32_t i = 0; i < sample_count; ++i, ++ray) {
-            const SampleStreams::Stream stream = streams_.stream(number, first_sample + i);
+        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray) {
+            const SampleStreams::Stream stream =
+                streams_.stream(number, group.first_sample + i);
             rays_.stream_seed[ray] = stream.seed;
             rays_.stream_index[ray] = stream.index;
         }
@@ -63,10 +62,10 @@ void TileRenderer::generate(const std::vector<Pixel> &pixels, uint32_t first_sam
                  {rays_.film_x.data(), rays_.film_y.data(), rays_.light_x.data(),
                   rays_.light_y.data()});
     ray = 0;
-    for (const Pixel &pixel : pixels) {
+    for (const Pixel &pixel : group.pixels) {
         const float x = float(sampled.x + int(pixel.column));
         const float y = float(sampled.y + int(pixel.row));
-        for (uint32_t i = 0; i < sample_count; ++i, ++ray) {
+        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray) {
             rays_.film_x[ray] += x;
             rays_.film_y[ray] += y;
         }
@@ -80,17 +79,29 @@ void TileRenderer::generate(const std::vector<Pixel> &pixels, uint32_t first_sam
     std::fill(rays_.t_max.begin(), rays_.t_max.end(), scene_.plane.far_clip);
 }
 
-void TileRenderer::trace_camera_rays() {
-    RayGroup group;
-    group.count = uint32_t(rays_.t.size());
-    group.has_common_origin = true;
-    group.common_origin = scene_.plane.origin;
+void TileRenderer::trace_camera_rays(const PixelGroup &group) {
+    RayGroup rays;
+    rays.count = uint32_t(rays_.t.size());
+    rays.has_common_origin = true;
+    rays.common_origin = scene_.plane.origin;
     for (int k = 0; k < 3; ++k)
-        group.direction[k] = rays_.direction[k].data();
-    group.t_min = rays_.t_min.data();
-    group.t_max = rays_.t_max.data();
-    trace_closest(*scene_.data.tree, group, options_,
-                  HitGroup{rays_.t.data(), rays_.primitive.data()}, counters_.primary);
+        rays.direction[k] = rays_.direction[k].data();
+    rays.t_min = rays_.t_min.data();
+    rays.t_max = rays_.t_max.data();
+
+    const PixelRect &sampled = target_.blocks.sampled();
+    const int x = sampled.x + int(group.pixels[0].column);
+    const int y = sampled.y + int(group.pixels[0].row);
+    CameraTile tile;
+    tile.camera = scene_.plane.single;
+    tile.x = uint32_t(x);
+    tile.y = uint32_t(y);
+    tile.size = group.side;
+    tile.samples = group.sample_count;
+    const bool is_square = group.side > 0 && x >= 0 && y >= 0;
+    trace_closest(*scene_.data.tree, rays, options_,
+                  HitGroup{rays_.t.data(), rays_.primitive.data()}, counters_.primary,
+                  is_square ? &tile : nullptr);
 }
 
 void TileRenderer::shade_hits() {
@@ -191,19 +202,18 @@ void TileRenderer::pass_hidden_emitters() {
     }
 }
 
-void TileRenderer::write(const std::vector<Pixel> &pixels, uint32_t first_sample,
-                         uint32_t sample_count) {
+void TileRenderer::write(const PixelGroup &group) {
     const Film &film = scene_.data.film;
     const PixelRect &sampled = target_.blocks.sampled();
     size_t ray = 0;
-    for (const Pixel &pixel : pixels) {
+    for (const Pixel &pixel : group.pixels) {
         const uint32_t column = pixel.column + uint32_t(sampled.x) - film.crop_x;
         const uint32_t row = pixel.row + uint32_t(sampled.y) - film.crop_y;
-        if (target_.primitive && first_sample == 0 && column < film.crop_width &&
+        if (target_.primitive && group.first_sample == 0 && column < film.crop_width &&
             row < film.crop_height)
             target_.primitive[size_t(row) * film.crop_width + column] =
                 int32_t(rays_.primitive[ray]);
-        for (uint32_t i = 0; i < sample_count; ++i, ++ray)
+        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray)
             target_.blocks.add(pixel.column, pixel.row, rays_.film_x[ray],
                                rays_.film_y[ray],
                                &rays_.values[ray * target_.channels.count]);

@@ -49,6 +49,18 @@ struct RenderCounters {
     Counters primary, shadow;
 };
 
+struct Pixel {
+    uint32_t column = 0, row = 0; // of the sampled rectangle
+};
+
+// What is traced together: samples [first_sample, first_sample + sample_count) of each
+// pixel.
+struct PixelGroup {
+    std::vector<Pixel> pixels;
+    uint32_t side = 0; // of the square that they fill in Morton order; 0 if they do not
+    uint32_t first_sample = 0, sample_count = 0;
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
@@ -58,13 +70,8 @@ public:
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
 
-    struct Pixel {
-        uint32_t column = 0, row = 0; // of the sampled rectangle
-    };
-
-    // Renders samples [first, first + count) of each pixel, in the order of the pixels.
-    void render(const std::vector<Pixel> &pixels, uint32_t first_sample,
-                uint32_t sample_count);
+    // Rays, and whatever is added up, come in the order of the pixels and then of samples.
+    void render(const PixelGroup &group);
 
     const RenderCounters &counters() const { return counters_; }
 
@@ -87,14 +94,12 @@ private:
         Vec3f origin;
     };
 
-    void generate(const std::vector<Pixel> &pixels, uint32_t first_sample,
-                  uint32_t sample_count);
-    void trace_camera_rays();
+    void generate(const PixelGroup &group);
+    void trace_camera_rays(const PixelGroup &group);
     void shade_hits();
     void shade(uint32_t ray, const SurfacePoint &point);
     void pass_hidden_emitters();
-    void write(const std::vector<Pixel> &pixels, uint32_t first_sample,
-               uint32_t sample_count);
+    void write(const PixelGroup &group);
 
     Vec3f direction(uint32_t ray) const {
         return {rays_.direction[0][ray], rays_.direction[1][ray], rays_.direction[2][ray]};

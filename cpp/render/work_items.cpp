@@ -21,26 +21,26 @@ WorkItems::WorkItems(const PixelRect &sampled, uint32_t samples_per_pixel,
                      uint32_t rays_per_group)
     : width_(sampled.width), height_(sampled.height), samples_(samples_per_pixel) {
     constexpr uint32_t MAX_SIDE = 1024; // a square of it is numbered in 20 bits
-    uint32_t group_side = 1;
-    while (group_side < MAX_SIDE &&
-           uint64_t(4) * group_side * group_side * samples_ <= rays_per_group)
-        group_side *= 2;
-    group_pixels_ = group_side * group_side;
-    group_samples_ = group_side > 1 ? samples_ : std::min(samples_, rays_per_group);
-    side_ = std::max(group_side, FilmBlocks::BLOCK_SIZE);
+    while (group_side_ < MAX_SIDE &&
+           uint64_t(4) * group_side_ * group_side_ * samples_ <= rays_per_group)
+        group_side_ *= 2;
+    group_samples_ = group_side_ > 1 ? samples_ : std::min(samples_, rays_per_group);
+    side_ = std::max(group_side_, FilmBlocks::BLOCK_SIZE);
     across_ = (width_ + side_ - 1) / side_;
     down_ = (height_ + side_ - 1) / side_;
 }
 
 void WorkItems::collect_pixels(uint32_t item, uint32_t first_code,
-                               std::vector<TileRenderer::Pixel> &pixels) const {
+                               PixelGroup &group) const {
     const uint32_t left = item % across_ * side_, top = item / across_ * side_;
-    pixels.clear();
-    for (uint32_t code = first_code; code < first_code + group_pixels_; ++code) {
+    const uint32_t count = group_side_ * group_side_;
+    group.pixels.clear();
+    for (uint32_t code = first_code; code < first_code + count; ++code) {
         const uint32_t column = left + even_bits(code), row = top + even_bits(code >> 1);
         if (column < width_ && row < height_)
-            pixels.push_back({column, row});
+            group.pixels.push_back({column, row});
     }
+    group.side = group.pixels.size() == count ? group_side_ : 0;
 }
 
 } // namespace mlrt

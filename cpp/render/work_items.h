@@ -24,27 +24,28 @@ public:
 
     uint32_t count() const { return across_ * down_; }
 
-    // Calls visit(pixels, first_sample, sample_count) for each group of an item, in order.
+    // Calls visit(group) for each group of an item, in order.
     template <typename Visit>
     void for_each_group(uint32_t item, Visit &&visit) const {
-        std::vector<TileRenderer::Pixel> pixels;
-        for (uint32_t code = 0; code < side_ * side_; code += group_pixels_) {
-            collect_pixels(item, code, pixels);
-            if (pixels.empty())
-                continue;
-            for (uint32_t first = 0; first < samples_; first += group_samples_)
-                visit(pixels, first, std::min(group_samples_, samples_ - first));
+        PixelGroup group;
+        for (uint32_t code = 0; code < side_ * side_; code += group_side_ * group_side_) {
+            collect_pixels(item, code, group);
+            for (uint32_t first = 0; first < samples_ && !group.pixels.empty();
+                 first += group_samples_) {
+                group.first_sample = first;
+                group.sample_count = std::min(group_samples_, samples_ - first);
+                visit(group);
+            }
         }
     }
 
 private:
-    void collect_pixels(uint32_t item, uint32_t first_code,
-                        std::vector<TileRenderer::Pixel> &pixels) const;
+    void collect_pixels(uint32_t item, uint32_t first_code, PixelGroup &group) const;
 
     uint32_t width_, height_;
     uint32_t samples_;
-    uint32_t group_pixels_ = 1;  // a power of four
-    uint32_t group_samples_ = 1; // fewer than samples_ only if group_pixels_ is 1
+    uint32_t group_side_ = 1;    // pixels along the side of a group, a power of two
+    uint32_t group_samples_ = 1; // fewer than samples_ only if group_side_ is 1
     uint32_t side_ = FilmBlocks::BLOCK_SIZE;
     uint32_t across_ = 0, down_ = 0;
 };
