@@ -1,7 +1,7 @@
 """All ways through the tree agree bit for bit on the rays of real scenes.
 
-`pytest --full` traces 2^20 camera rays and the shadow rays of their hits, and 20,000 of them
-without the tree; otherwise a sixteenth of that.
+`pytest --full` traces 2^20 camera rays and the shadow rays of their hits, and 20,000 of
+them without the tree; otherwise a sixteenth of that.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ THIRD_PARTY = [
 def camera_rays(
     scene: SceneArrays, side: int
 ) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Rays through the centres of side x side pixels, in Morton order: packets and tiles are
-    then squares of the film. They share their origin; t is depth."""
+    """Rays through the centres of side x side pixels, in Morton order: packets and tiles
+    are then squares of the film. They share their origin; t is depth."""
     index = np.arange(side * side)
     x = np.zeros_like(index)
     y = np.zeros_like(index)
