@@ -27,10 +27,11 @@ class RenderResult:
     """An image and how it came about.
 
     image: (H, W, 3) float32, linear RGB.
-    aovs: by name: depth (H, W), distance along the ray in scene units; normal (H, W, 3),
-    shading normal in world space; prim (H, W), number of the face, -1 where there is none.
+    aovs: by name: depth (H, W) float32, distance from the near plane in scene units, 0 for
+    a miss; normal (H, W, 3) float32, shading normal in world space; both are filtered as
+    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss.
     timings: seconds of load, build and render.
-    counters: what the traversal did, by name; see `cpp/base/counters.h`.
+    counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays.
     warnings: what was approximated or ignored.
     """
 
@@ -78,6 +79,8 @@ class PreparedScene:
             list(aovs),
             progress,
         )
+        if progress is not None:
+            progress(1.0)
         return RenderResult(
             image=result["image"],
             aovs=dict(result["aovs"]),

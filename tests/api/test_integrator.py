@@ -1,0 +1,142 @@
+"""The plugin `mlrt` in Mitsuba, in scalar_rgb and llvm_ad_rgb."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import pytest
+import scene_files
+
+from mlrt_plugin import UnsupportedFeature, render
+
+SceneFile = Callable[..., Path]
+
+OWN = '<integrator type="mlrt"/>'
+
+
+def test_image_is_that_of_render(scene_file: SceneFile, scalar_variant: None) -> None:
+    other = scene_files.SENSOR.replace('id="eye"', "").replace('value="16"', 'value="20"')
+    path = scene_file(integrator=OWN, sensor=scene_files.SENSOR + other)
+    scene = mi.load_file(str(path))
+    integrator = mi.load_dict({"type": "mlrt"})
+    images = [
+        mi.render(scene, spp=3, seed=5),
+        mi.render(scene, integrator=integrator, spp=3, seed=5),
+        mi.render(scene, integrator=integrator, sensor=scene.sensors()[0], spp=3, seed=5),
+    ]
+    for image in images:
+        assert isinstance(image, mi.TensorXf)
+        np.testing.assert_array_equal(np.array(image), render(path, spp=3, seed=5).image)
+    second = np.array(mi.render(scene, sensor=1))
+    np.testing.assert_array_equal(second, render(path, sensor=1).image)
+    assert second.shape == (12, 20, 3)
+    assert second.max() > 0
+
+
+def test_sensor_that_is_not_in_the_scene(
+    scene_file: SceneFile, scalar_variant: None
+) -> None:
+    path = scene_file(integrator=OWN)
+    scene = mi.load_file(str(path))
+    stranger = mi.load_dict(scene_files.scene_dict()["eye"])
+    image = np.array(mi.render(scene, sensor=stranger))
+    np.testing.assert_array_equal(image, render(scene, sensor=stranger).image)
+    assert image.shape == (12, 16, 3)
+
+
+def test_changes_of_the_scene_are_seen(scene_file: SceneFile, scalar_variant: None) -> None:
+    scene = mi.load_file(str(scene_file(integrator=OWN)))
+    before = np.array(mi.render(scene))
+    parameters = mi.traverse(scene)
+    parameters["lamp.intensity.value"] = [16, 14, 12]
+    parameters.update()
+    np.testing.assert_allclose(np.array(mi.render(scene)), 2 * before, rtol=1e-6)
+
+
+def test_parameters(scene_file: SceneFile, scalar_variant: None) -> None:
+    panel = '<shape type="rectangle"><emitter type="area"/></shape>'
+    hidden = (
+        '<integrator type="mlrt"><boolean name="hide_emitters" value="true"/></integrator>'
+    )
+    path = scene_file(integrator=hidden, shapes=panel, emitters="")
+    assert np.array(mi.render(mi.load_file(str(path)))).max() == 0
+    assert render(path).image.max() == 0
+    assert render(path, hide_emitters=False).image.max() == 1
+    with pytest.raises(RuntimeError, match="bsdf_samples = 0 only"):
+        mi.load_dict({"type": "mlrt", "bsdf_samples": 1})
+    with pytest.raises(RuntimeError, match="unreferenced"):
+        mi.load_dict({"type": "mlrt", "bounces": 1})
+    assert "packet" in str(mi.load_dict({"type": "mlrt", "traversal": "packet"}))
+
+
+def test_options_reach_the_tracer(scene_file: SceneFile, scalar_variant: None) -> None:
+    own = '<integrator type="mlrt"><string name="traversal" value="wrong"/></integrator>'
+    path = scene_file(integrator=own)
+    with pytest.raises(ValueError, match="traversal"):
+        render(path)
+    with pytest.raises(ValueError, match="traversal"):
+        mi.render(mi.load_file(str(path)))
+
+
+def test_unsupported_scene(scene_file: SceneFile, scalar_variant: None) -> None:
+    scene = mi.load_file(
+        str(scene_file(integrator=OWN, shapes='<shape type="sphere" id="ball"/>'))
+    )
+    with pytest.raises(UnsupportedFeature, match="'ball'"):
+        mi.render(scene)
+
+
+SCRIPT = """
+import sys
+variant, order, path = sys.argv[1:]
+if variant.startswith("llvm"):
+    from mlrt_compare import llvm
+    try:
+        llvm.activate()
+    except llvm.LlvmUnavailable as error:
+        print("no LLVM:", error)
+        raise SystemExit
+import mitsuba as mi
+if order == "before":
+    import mlrt_plugin
+    mi.set_variant(variant)
+else:
+    mi.set_variant(variant)
+    import mlrt_plugin
+import numpy as np
+scene = mi.load_file(path)
+image = np.array(mi.render(scene, seed=2, spp=3))
+integrator = mi.load_dict({"type": "mlrt"})
+again = np.array(mi.render(scene, integrator=integrator, seed=2, spp=3))
+np.testing.assert_array_equal(again, image)
+np.testing.assert_array_equal(mlrt_plugin.render(path, seed=2, spp=3).image, image)
+assert image.shape == (12, 16, 3) and image.max() > 0
+mi.set_variant("scalar_spectral")
+mi.set_variant(variant)
+mi.load_dict({"type": "mlrt"})
+assert mi.variant() == variant
+print("done")
+"""
+
+
+@pytest.mark.parametrize("order", ["before", "after"])
+@pytest.mark.parametrize("variant", ["scalar_rgb", "llvm_ad_rgb"])
+def test_import_before_and_after_the_variant(
+    scene_file: SceneFile, variant: str, order: str
+) -> None:
+    path = scene_file(integrator=OWN)
+    run = subprocess.run(
+        [sys.executable, "-c", SCRIPT, variant, order, str(path)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        cwd=path.parent,
+    )
+    if run.stdout.startswith("no LLVM"):
+        pytest.skip(run.stdout.strip())
+    assert (run.returncode, run.stdout) == (0, "done\n"), run.stderr
