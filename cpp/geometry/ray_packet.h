@@ -65,7 +65,7 @@ struct FilteredVolumes {
         const Vec3d max_direction(rays.max_direction);
         // Rounding the normal to float, the product and two sums: four in a row, 5 with the
         // rounding of the bound. The normal's own error in double adds as in
-        // triangle_test.cpp. The last term outweighs what underflow can lose.
+        // triangle_test.cpp.
         const auto edge = [&](const Vec3d &p, const Vec3d &q, FloatPacket &volume) {
             const Vec3d normal = cross(p, q);
             const Vec3f n(normal);
@@ -73,7 +73,9 @@ struct FilteredVolumes {
                 rays.direction.x, FloatPacket(n.x),
                 drjit::fmadd(rays.direction.y, FloatPacket(n.y), rays.direction.z * n.z));
             return 5.0 * double(FLOAT_ROUNDOFF) * dot(abs(normal), max_direction) +
-                   10 * DOUBLE_ROUNDOFF * dot(cross_magnitude(p, q), max_direction);
+                   10 * DOUBLE_ROUNDOFF * dot(cross_magnitude(p, q), max_direction) +
+                   double(UNDERFLOW) *
+                       (max_direction.x + max_direction.y + max_direction.z);
         };
         const double bound =
             std::max({edge(b, c, u), edge(c, a, v), edge(a, b, w), double(SMALLEST_BOUND)});
@@ -100,7 +102,8 @@ struct FilteredVolumes {
         const FloatPacket direction_sum = absolute(rays.direction.x) +
                                           absolute(rays.direction.y) +
                                           absolute(rays.direction.z);
-        error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) + SMALLEST_BOUND;
+        error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) +
+                UNDERFLOW * direction_sum + SMALLEST_BOUND;
     }
 
     // Lanes that certainly hit, and lanes that neither certainly hit nor certainly miss.
@@ -113,6 +116,9 @@ struct FilteredVolumes {
     }
 
 private:
+    // What underflow may lose: 2^-150 in each component of a normal, times the direction,
+    // and as much in each product with the direction.
+    static constexpr float UNDERFLOW = 0x1p-147f;
     static constexpr float SMALLEST_BOUND = 0x1p-120f;
 
     FloatPacket least() const { return minimum(u, minimum(v, w)); }

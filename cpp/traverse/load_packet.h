@@ -34,7 +34,8 @@ LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
 
     LoadedPacket<Origin> loaded;
     RayPacket<Origin> &rays = loaded.rays;
-    rays.t_min = maximum(load_padded(group.t_min, first, group.count), FloatPacket(0.0f));
+    // In this order NaN stays NaN, and the ray inactive.
+    rays.t_min = maximum(FloatPacket(0.0f), load_padded(group.t_min, first, group.count));
     rays.t_max = load_padded(group.t_max, first, group.count);
     auto active = rays.t_min < rays.t_max;
     if constexpr (std::is_same_v<Origin, CommonOrigin>) {

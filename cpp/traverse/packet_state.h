@@ -37,7 +37,8 @@ struct PacketState {
         counters.exact_tests += candidates.exact_tests;
         if (candidates.hit == 0)
             return;
-        const auto in_front = candidates.t > rays.t_min;
+        // Infinity stands for a miss.
+        const auto in_front = (candidates.t > rays.t_min) & (candidates.t < INFINITE);
         // Dr.Jit compares unsigned integers as signed ones on AVX-512, where NO_PRIMITIVE
         // is the least: a lane without a hit is told by `found` instead.
         const LaneBits lower_number =

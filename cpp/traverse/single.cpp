@@ -20,7 +20,8 @@ void test_triangle(const KdTree &tree, const Ray &ray, uint32_t primitive, Hit &
     if (!decision.hit)
         return;
     const float t = hit_distance(ray.origin, ray.direction, triangle);
-    if (t > ray.t_min && (t < best.t || (t == best.t && primitive < best.primitive)))
+    if (t > ray.t_min && t < INFINITE &&
+        (t < best.t || (t == best.t && primitive < best.primitive)))
         best = {t, primitive};
 }
 
