@@ -20,6 +20,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -67,6 +68,20 @@ def meet(origin: Point, direction: Point, a: Point, b: Point, c: Point) -> Fract
     return Fraction(_dot(normal, a), _dot(normal, direction))
 
 
+def barycentric(
+    origin: Point, direction: Point, a: Point, b: Point, c: Point
+) -> tuple[Fraction, Fraction]:
+    """Returns the exact weights of b and c at the point where a line meets a triangle.
+
+    The line must meet it, see :func:`meet`.
+    """
+    a, b, c = _minus(a, origin), _minus(b, origin), _minus(c, origin)
+    u = _dot(direction, _cross(b, c))
+    v = _dot(direction, _cross(c, a))
+    w = _dot(direction, _cross(a, b))
+    return Fraction(v, u + v + w), Fraction(w, u + v + w)
+
+
 def round_to_float32(value: Fraction) -> np.float32:
     """Returns the float32 nearest to a fraction, ties to even, with overflow to infinity.
 
@@ -88,16 +103,34 @@ def round_to_float32(value: Fraction) -> np.float32:
 
 
 @dataclass(frozen=True)
-class Hit:
-    """The nearest hit of one ray.
+class Crossing:
+    """A face that a line meets, and the exact parameter where it does."""
 
-    ``faces`` holds, lowest first, every face hit at the float32 ``t``; ``exact`` is the
-    true parameter of the first of them.
-    """
+    face: int
+    exact: Fraction
+
+    @cached_property
+    def t(self) -> np.float32:
+        """The float32 parameter that should be reported."""
+        return round_to_float32(self.exact)
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether all parameters within a relative 2^-30 of the exact one round to t.
+
+        Where they don't, rounding an accurate but not exact double may give a neighbour.
+        """
+        slack = self.exact * Fraction(1, 2**30)
+        ends = round_to_float32(self.exact - slack), round_to_float32(self.exact + slack)
+        return bool(ends[0] == ends[1])
+
+
+@dataclass(frozen=True)
+class Hit:
+    """The nearest hit of one ray: the float32 t and every face hit there, lowest first."""
 
     t: np.float32
     faces: tuple[int, ...]
-    exact: Fraction
 
     @property
     def face(self) -> int:
@@ -160,7 +193,28 @@ class Soup:
             margin = (line_size @ size.T) * 2.0**-40
             below |= value < -margin
             above |= value > margin
-        return ~(below & above) & self.usable
+        possible: npt.NDArray[np.bool_] = ~(below & above) & self.usable
+        return possible
+
+    def crossings(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike
+    ) -> Iterator[list[Crossing]]:
+        """Yields for each ray where its line meets faces, lowest face first.
+
+        origins, directions (N, 3) float32. Rays that hit nothing by contract meet nothing.
+        """
+        origins = np.asarray(origins, np.float32)
+        directions = np.asarray(directions, np.float32)
+        rows = max(1, 2_000_000 // max(1, len(self.faces)))
+        for first in range(0, len(origins), rows):
+            o, d = origins[first : first + rows], directions[first : first + rows]
+            traceable = [is_traceable(*ray) for ray in zip(o, d, strict=True)]
+            safe = np.array(traceable)[:, None]
+            possible = safe & self.candidates(np.where(safe, o, 0), np.where(safe, d, 0))
+            for i, row in enumerate(possible):
+                faces = np.flatnonzero(row)
+                found = [(int(face), self.meet(o[i], d[i], int(face))) for face in faces]
+                yield [Crossing(face, t) for face, t in found if t is not None]
 
     def hits(
         self,
@@ -168,68 +222,57 @@ class Soup:
         directions: npt.ArrayLike,
         t_min: npt.ArrayLike = 0.0,
         t_max: npt.ArrayLike = math.inf,
-    ) -> Iterator[Hit | None]:
-        """Yields the nearest hit of each ray, None for a miss.
+    ) -> list[Hit | None]:
+        """Returns the nearest hit of each ray, see :func:`nearest_hits`."""
+        return nearest_hits(list(self.crossings(origins, directions)), t_min, t_max)
 
-        origins, directions (N, 3); t_min, t_max (N,) or one number; all float32.
-        """
-        origins = np.asarray(origins, np.float32)
-        directions = np.asarray(directions, np.float32)
-        lowest = np.broadcast_to(np.asarray(t_min, np.float32), len(origins))
-        highest = np.broadcast_to(np.asarray(t_max, np.float32), len(origins))
-        rows = max(1, 2_000_000 // max(1, len(self.faces)))
-        for first in range(0, len(origins), rows):
-            block = slice(first, first + rows)
-            traceable = [
-                is_traceable(*ray)
-                for ray in zip(origins[block], directions[block], strict=True)
-            ]
-            safe = np.array(traceable)[:, None]
-            possible = safe & self.candidates(
-                np.where(safe, origins[block], 0), np.where(safe, directions[block], 0)
-            )
-            for i, row in enumerate(possible, first):
-                yield self._nearest(
-                    origins[i], directions[i], lowest[i], highest[i], np.flatnonzero(row)
-                )
 
-    def _nearest(
-        self,
-        origin: FloatArray,
-        direction: FloatArray,
-        t_min: np.float32,
-        t_max: np.float32,
-        faces: npt.NDArray[np.intp],
-    ) -> Hit | None:
-        if not len(faces):
-            return None
-        o, d = to_point(origin), to_point(direction)
-        limit: Fraction | None = None
-        found: list[tuple[np.float32, int, Fraction]] = []
-        for face in faces:
-            a, b, c = (self.points[i] for i in self.faces[face])
-            exact = meet(o, d, a, b, c)
-            if exact is None or (limit is not None and exact > limit):
-                continue
-            t = round_to_float32(exact)
-            if t_min < t <= t_max and t <= _FLOAT32_MAX:
-                found.append((t, int(face), exact))
-                # Rounding is monotonic: nothing beyond the next float32 is rounded to t.
-                with np.errstate(over="ignore"):
-                    beyond = np.nextafter(t, np.float32(math.inf))
-                if np.isfinite(beyond):
-                    limit = Fraction(float(beyond))
-        if not found:
-            return None
-        nearest = min(found)[0]
-        ties = [(face, exact) for t, face, exact in found if t == nearest]
-        return Hit(nearest, tuple(face for face, _ in ties), ties[0][1])
+def nearest_hits(
+    crossings: list[list[Crossing]],
+    t_min: npt.ArrayLike = 0.0,
+    t_max: npt.ArrayLike = math.inf,
+) -> list[Hit | None]:
+    """Returns the nearest hit of each ray in its interval, None for a miss.
+
+    t_min, t_max (N,) or one number, float32.
+    """
+    lowest = np.broadcast_to(np.asarray(t_min, np.float32), len(crossings))
+    highest = np.broadcast_to(np.asarray(t_max, np.float32), len(crossings))
+    nearest: list[Hit | None] = []
+    for ray, low, high in zip(crossings, lowest, highest, strict=True):
+        # A parameter beyond the largest float32 is not reported: inf stands for a miss.
+        found = [c for c in ray if low < c.t <= high and c.t <= _FLOAT32_MAX]
+        t = min((c.t for c in found), default=np.float32(math.inf))
+        faces = tuple(c.face for c in found if c.t == t)
+        nearest.append(Hit(t, faces) if faces else None)
+    return nearest
 
 
 def _cross_of_sizes(a: DoubleArray, b: DoubleArray) -> DoubleArray:
     """Returns the sums of the magnitudes of the terms of a x b."""
     a, b = np.abs(a), np.abs(b)
     return np.roll(a, -1, 1) * np.roll(b, 1, 1) + np.roll(a, 1, 1) * np.roll(b, -1, 1)
+
+
+def segment_meets_box(
+    origin: npt.ArrayLike,
+    direction: npt.ArrayLike,
+    t_max: float,
+    lower: npt.ArrayLike,
+    upper: npt.ArrayLike,
+) -> bool:
+    """Returns whether {origin + t direction, 0 <= t <= t_max} meets a closed box."""
+    entry, end = Fraction(0), None if math.isinf(t_max) else Fraction(t_max)
+    axes = (to_point(vector) for vector in (origin, direction, lower, upper))
+    for o, d, lo, hi in zip(*axes, strict=True):
+        if d == 0:
+            if not lo <= o <= hi:
+                return False
+            continue
+        first, last = sorted((Fraction(lo - o, d), Fraction(hi - o, d)))
+        entry = max(entry, first)
+        end = last if end is None else min(end, last)
+    return end is None or entry <= end
 
 
 def double_hits(

@@ -81,7 +81,7 @@ def sphere(subdivisions: int = 3) -> Scene:
     return snap(points), np.array(faces, np.uint32)
 
 
-def fan(count: int = 400) -> Scene:
+def fan(count: int = 150) -> Scene:
     """Returns slivers that share one vertex, in a tilted plane."""
     angle = np.linspace(0, 2 * np.pi, count, endpoint=False)
     rim = np.stack([np.cos(angle), np.sin(angle), 0.25 * np.cos(angle)], axis=1)

@@ -159,6 +159,23 @@ void bind_beam(nb::module_ &s) {
         },
         nb::arg("origin"), nb::arg("base"), nb::arg("dx"), nb::arg("dy"), nb::arg("x0"),
         nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"));
+    s.def(
+        "tile_beam",
+        [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
+           const std::array<uint32_t, 4> &tile, uint32_t first, uint32_t count,
+           double t_max) -> std::optional<Beam> {
+            const auto [x, y, size, samples] = tile;
+            Beam beam;
+            if (!tile_beam(
+                    {{vec(origin), vec(base), vec(dx), vec(dy)}, x, y, size, samples},
+                    first, count, t_max, beam))
+                return std::nullopt;
+            return beam;
+        },
+        nb::arg("origin"), nb::arg("base"), nb::arg("dx"), nb::arg("dy"), nb::arg("tile"),
+        nb::arg("first"), nb::arg("count"), nb::arg("t_max"),
+        "Beam of a run of rays of the tile (x, y, size, samples), None if it is no "
+        "rectangle.");
     s.def("cull_children", [](const Beam &beam, const Point &lo, const Point &hi, int axis,
                               double position) {
         return name_of(cull_children(beam, box(lo, hi), {axis, position}));

@@ -93,7 +93,7 @@ def test_ties_interval_and_bad_rays() -> None:
     down = ((0.25, 0.25, 2), (0, 0, -1))
 
     def nearest(t_min: float, t_max: float) -> tuple[float, tuple[int, ...]] | None:
-        hit = next(soup.hits([down[0]], [down[1]], t_min, t_max))
+        (hit,) = soup.hits([down[0]], [down[1]], t_min, t_max)
         return None if hit is None else (float(hit.t), hit.faces)
 
     assert nearest(0, math.inf) == (1.0, (0,))
@@ -102,7 +102,7 @@ def test_ties_interval_and_bad_rays() -> None:
     assert nearest(1, math.inf) == (2.0, (1, 2))
     assert nearest(2, math.inf) is None
     bad = [(math.nan, 0, 0), (0, math.inf, 0), (0, 0, 0)]
-    assert list(soup.hits([down[0]] * 3, bad)) == [None] * 3
+    assert soup.hits([down[0]] * 3, bad) == [None] * 3
 
 
 @pytest.mark.parametrize("name", ["soup", "sphere", "far sphere", "slivers"])
@@ -123,8 +123,29 @@ def test_agrees_with_double_precision_where_that_is_safe() -> None:
     scene = workloads.soup(rng, 200)
     origins, directions = workloads.into_box(rng, scene, 500)
     t, face = oracles.double_hits(*scene, origins, directions)
-    hits = list(oracles.Soup(*scene).hits(origins, directions))
+    crossings = list(oracles.Soup(*scene).crossings(origins, directions))
+    hits = oracles.nearest_hits(crossings)
     assert [-1 if hit is None else hit.face for hit in hits] == face.tolist()
-    exact = np.array([math.inf if hit is None else float(hit.exact) for hit in hits])
-    np.testing.assert_allclose(t, exact, rtol=1e-12)
+    for i, hit in enumerate(hits):
+        if hit is not None:
+            exact = min(crossing.exact for crossing in crossings[i] if crossing.exact > 0)
+            assert t[i] == pytest.approx(float(exact), rel=1e-12)
     assert (face >= 0).mean() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("direction", "t_max", "meets"),
+    [
+        ((1, 0, 0), 1.0, True),
+        ((1, 0, 0), 0.999, False),
+        ((-1, 0, 0), math.inf, False),
+        ((1, 1, 0), math.inf, True),
+        ((1, np.nextafter(np.float32(1), np.float32(2)), 0), math.inf, False),
+        ((0, 0, 1), math.inf, False),
+    ],
+)
+def test_boxes_are_closed(direction: tuple[float, ...], t_max: float, meets: bool) -> None:
+    assert (
+        oracles.segment_meets_box((0, 0, 0), direction, t_max, (1, 0, 0), (2, 1, 1))
+        is meets
+    )

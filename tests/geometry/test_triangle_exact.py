@@ -1,0 +1,132 @@
+"""Brute force in the core against exact arithmetic: the hit contract itself."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import oracles
+import pytest
+import workloads
+from tracing import BRUTE_FORCE, Hits, build, closest, each_core, occluded
+
+SEED = 424242
+SCENES = sorted(workloads.scenes(np.random.default_rng(SEED)))
+
+
+def assert_exact(found: Hits, expected: list[oracles.Hit | None]) -> None:
+    """Asserts the face that the contract chooses and the correctly rounded t."""
+    face = [-1 if hit is None else hit.face for hit in expected]
+    t = np.array([np.inf if hit is None else hit.t for hit in expected], np.float32)
+    wrong = np.flatnonzero((found.face != face) | (found.t != t))
+    assert wrong.size == 0, "\n".join(
+        [f"{wrong.size} of {len(face)} rays are wrong (seed {SEED}):"]
+        + [
+            f"ray {i}: {found.face[i]} at {found.t[i]}, not {expected[i]}"
+            for i in wrong[:5]
+        ]
+    )
+
+
+def certain(
+    soup: oracles.Soup, rays: workloads.Rays
+) -> tuple[workloads.Rays, list[list[oracles.Crossing]]]:
+    """Returns the rays whose parameters are not almost halfway between two float32.
+
+    And, for each, where it meets faces. The others, a few per cent, may round either way.
+    """
+    crossings = list(soup.crossings(*rays))
+    keep = np.array([all(c.is_certain for c in ray) for ray in crossings])
+    assert keep.mean() > 0.9
+    kept = [ray for ray, kept in zip(crossings, keep, strict=True) if kept]
+    return (rays[0][keep], rays[1][keep]), kept
+
+
+@each_core
+@pytest.mark.parametrize("name", SCENES)
+def test_nearest_hits_are_exact(core: ModuleType, name: str) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.scenes(rng)[name]
+    rays, crossings = certain(oracles.Soup(*scene), workloads.all_rays(rng, scene, 100))
+    expected = oracles.nearest_hits(crossings)
+    assert any(expected)
+    tree = build(core, scene)
+    assert_exact(closest(tree, rays, BRUTE_FORCE), expected)
+    hit = [hit is not None for hit in expected]
+    np.testing.assert_array_equal(occluded(tree, rays, BRUTE_FORCE), hit)
+
+
+@each_core
+@pytest.mark.parametrize("name", ["soup", "duplicates", "sphere", "stairs"])
+def test_intervals_are_open_below_and_closed_above(core: ModuleType, name: str) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.scenes(rng)[name]
+    rays, crossings = certain(oracles.Soup(*scene), workloads.all_rays(rng, scene, 60))
+    tree = build(core, scene)
+    nearest = oracles.nearest_hits(crossings)
+    t = np.array([1.0 if hit is None else hit.t for hit in nearest], np.float32)
+    zero, infinity = np.zeros_like(t), np.full_like(t, np.inf)
+    below = np.nextafter(t, zero)
+    for t_min, t_max in ((t, infinity), (below, t), (zero, t), (zero, below), (t, t)):
+        expected = oracles.nearest_hits(crossings, t_min, t_max)
+        assert_exact(closest(tree, rays, BRUTE_FORCE, t_min, t_max), expected)
+        hit = [hit is not None for hit in expected]
+        np.testing.assert_array_equal(occluded(tree, rays, BRUTE_FORCE, t_min, t_max), hit)
+
+
+@each_core
+def test_barycentric_coordinates_are_those_of_the_exact_hit(core: ModuleType) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 200, 0.5)
+    rays = workloads.into_box(rng, scene, 300)
+    found = closest(build(core, scene), rays, BRUTE_FORCE)
+    soup = oracles.Soup(*scene)
+    hits = np.flatnonzero(found.face >= 0)
+    assert hits.size > 100
+    for i in hits:
+        corners = [soup.points[j] for j in soup.faces[found.face[i]]]
+        u, v = oracles.barycentric(
+            oracles.to_point(rays[0][i]), oracles.to_point(rays[1][i]), *corners
+        )
+        assert found.u[i] == pytest.approx(float(u), abs=2e-6)
+        assert found.v[i] == pytest.approx(float(v), abs=2e-6)
+
+
+# Products of the smallest coordinates and of long directions are far apart: what single
+# precision loses to underflow must not be taken for a decision.
+@each_core
+@pytest.mark.parametrize("common_origin", [False, True])
+@pytest.mark.parametrize(
+    ("power", "length"), [(-66, 40), (-60, 0), (-20, 0), (30, 0), (30, -40)]
+)
+def test_scaling_by_powers_of_two_scales_t(
+    core: ModuleType, power: int, length: int, common_origin: bool
+) -> None:
+    rng = np.random.default_rng(SEED)
+    vertices, faces = workloads.sphere(2)
+    origins = workloads.snap(rng.uniform(-0.3, 0.3, (1500, 3)))
+    if common_origin:
+        origins[:] = origins[0]
+    directions = rng.choice(vertices, 1500) - origins
+    size, stretch = np.float32(2.0**power), np.float32(2.0**length)
+    plain = closest(build(core, (vertices, faces)), (origins, directions), BRUTE_FORCE)
+    tree = build(core, (vertices * size, faces))
+    scaled = closest(tree, (origins * size, directions * stretch), BRUTE_FORCE)
+    np.testing.assert_array_equal(scaled.face, plain.face)
+    np.testing.assert_array_equal(scaled.t, plain.t * (size / stretch))
+    assert (plain.face >= 0).all()
+
+
+@each_core
+def test_needles_and_caps_far_from_the_ray_are_missed(core: ModuleType) -> None:
+    vertices = np.array(
+        [(0, 0, 0), (1, 0, 0), (1, 1e-7, 0), (600, 599, 0), (-600, -599, 0), (0, 1e-5, 0)],
+        np.float32,
+    )
+    faces = np.array([(0, 1, 2), (3, 4, 5)], np.uint32)
+    rng = np.random.default_rng(SEED)
+    scene = vertices, faces
+    rays, crossings = certain(oracles.Soup(*scene), workloads.all_rays(rng, scene, 100))
+    expected = oracles.nearest_hits(crossings)
+    assert any(expected)
+    assert_exact(closest(build(core, scene), rays, BRUTE_FORCE), expected)

@@ -1,0 +1,193 @@
+"""The entry point search: which nodes it visits, and that its answer is the deepest one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from types import ModuleType
+from typing import Any
+
+import beams
+import numpy as np
+import pytest
+import workloads
+from tracing import Options, build, each_core
+
+SEED = 2005
+LEAF = 3
+
+# The tree of figure 6 of Reshetov et al. 2005: children of inner nodes, near child first.
+# What hangs below nodes that the beam doesn't reach is left out.
+FIGURE = {
+    1: (21, 22),
+    21: (31, 32),
+    31: (41, 42),
+    41: (51, 52),
+    51: (61, 62),
+    52: (63, 64),
+    64: (71, 72),
+    72: (81, 82),
+    32: (43, 44),
+    44: (53, 54),
+}
+CULLED = {22, 42, 62}
+EMPTY = {43, 53, 81}
+
+
+def search_figure(core: ModuleType, impossible: set[int]) -> tuple[int | None, list[int]]:
+    """Returns the entry point and the visited nodes, by their labels in the figure."""
+    labels = [1]
+    children = {}
+    for label in labels:
+        if label in FIGURE:
+            children[labels.index(label)] = len(labels)
+            labels.extend(FIGURE[label])
+
+    def numbers(some: set[int]) -> set[int]:
+        return {labels.index(label) for label in some}
+
+    entry, visited = core.mlrta_selftest.search_table(
+        len(labels), children, numbers(EMPTY), numbers(CULLED), numbers(impossible)
+    )
+    return None if entry is None else labels[entry], [labels[node] for node in visited]
+
+
+@each_core
+def test_figure_of_the_paper(core: ModuleType) -> None:
+    entry, visited = search_figure(core, set())
+    assert visited == [1, 21, 31, 41, 51, 61, 52, 63, 32, 43, 44, 53, 54]
+    assert entry == 21
+
+
+@each_core
+def test_bifurcations_found_later_are_no_candidates(core: ModuleType) -> None:
+    """Without 54 the answer is 41. Leaf 61 would be lost in 52, met while its side was
+    searched."""
+    entry, visited = search_figure(core, {54})
+    assert visited[-1] == 54
+    assert entry == 41
+
+
+@each_core
+def test_barren_sides_are_no_candidates(core: ModuleType) -> None:
+    """Without 61 the first possible leaf is 63, and 41 has nothing on its other side."""
+    entry, visited = search_figure(core, {61, 54})
+    assert visited[:7] == [1, 21, 31, 41, 51, 61, 52]
+    assert entry == 52
+    assert search_figure(core, {61, 63, 71, 82, 54})[0] is None
+
+
+Path = tuple[int, ...]
+
+
+def last_common(paths: list[Path]) -> int | None:
+    """Returns the deepest node that all paths from the root lead through."""
+    common = None
+    for nodes in zip(*paths, strict=False):
+        if len(set(nodes)) > 1:
+            break
+        common = nodes[0]
+    return common
+
+
+@each_core
+def test_answer_is_the_lowest_common_ancestor_of_possible_leaves(core: ModuleType) -> None:
+    rng = np.random.default_rng(SEED)
+    misses = inner = leaves = 0
+    for _ in range(3000):
+        children: dict[int, int] = {}
+        parent = {0: -1}
+        for _ in range(rng.integers(0, 40)):
+            ends = [node for node in parent if node not in children]
+            split = int(rng.choice(ends))
+            children[split] = len(parent)
+            parent |= {len(parent): split, len(parent) + 1: split}
+        count = len(parent)
+        culled, impossible, empty = (
+            set(np.flatnonzero(rng.random(count) < rng.choice([0, 0.1, 0.4])).tolist())
+            for _ in range(3)
+        )
+        paths = []
+        for leaf in set(parent) - set(children) - impossible - empty:
+            path = [leaf]
+            while parent[path[-1]] >= 0:
+                path.append(parent[path[-1]])
+            if not culled.intersection(path[:-1]):
+                paths.append(tuple(reversed(path)))
+        entry, visited = core.mlrta_selftest.search_table(
+            count, children, empty, culled, impossible
+        )
+        assert entry == last_common(paths), (SEED, children, empty, culled, impossible)
+        assert len(set(visited)) == len(visited)
+        misses += entry is None
+        inner += entry in children
+        leaves += entry is not None and entry not in children
+    assert min(misses, inner, leaves) > 100
+
+
+def possible_leaves(
+    nodes: list[tuple[int, float, int]],
+    path: Path,
+    lo: tuple[float, ...],
+    hi: tuple[float, ...],
+    cull: Callable[..., tuple[bool, bool]],
+    possible: Callable[..., bool],
+) -> Iterator[Path]:
+    """Yields the path from the root to each leaf that a beam cannot exclude."""
+    axis, split, child = nodes[path[-1]]
+    if axis == LEAF:
+        if split > 0 and possible(lo, hi):
+            yield path
+        return
+    middle_lo, middle_hi = list(lo), list(hi)
+    middle_lo[axis] = middle_hi[axis] = split
+    enter_lower, enter_upper = cull(lo, hi, axis, split)
+    if enter_lower:
+        yield from possible_leaves(
+            nodes, (*path, child), lo, tuple(middle_hi), cull, possible
+        )
+    if enter_upper:
+        yield from possible_leaves(
+            nodes, (*path, child + 1), tuple(middle_lo), hi, cull, possible
+        )
+
+
+def judge(core: ModuleType, beam: Any, rejection: str) -> tuple[Any, Any]:
+    """Returns step 1 as (enter lower, enter upper), and step 2."""
+    s = core.mlrta_selftest
+
+    def cull(lo: Any, hi: Any, axis: int, split: float) -> tuple[bool, bool]:
+        answer = s.cull_children(beam, lo, hi, axis, split)
+        upper = s.upper_is_near(beam, axis, split)
+        return (
+            answer == "both" or (answer == "near_only") != upper,
+            answer == "both" or (answer == "near_only") == upper,
+        )
+
+    tests = {
+        "slopes": lambda lo, hi: s.may_enter_by_slopes(beam, lo, hi),
+        "parameters": lambda lo, hi: s.may_enter_by_parameters(beam, lo, hi),
+        "none": lambda lo, hi: True,
+    }
+    return cull, tests[rejection]
+
+
+@each_core
+@pytest.mark.parametrize("rejection", ["slopes", "parameters", "none"])
+@pytest.mark.parametrize("common_origin", [True, False])
+def test_beams_in_real_trees(core: ModuleType, rejection: str, common_origin: bool) -> None:
+    rng = np.random.default_rng(SEED)
+    deep = 0
+    for scene in (workloads.soup(rng, 100), workloads.stairs(), workloads.sphere(2)):
+        tree = build(core, scene)
+        nodes = core.mlrta_selftest.nodes_of(tree)
+        options: Options = {"leaf_rejection": rejection}
+        for _ in range(25):
+            origins, directions = beams.bundle(rng, 6, common_origin, spread=0.1)
+            ends = np.zeros(6, np.float32), np.full(6, np.inf, np.float32)
+            beam = core.mlrta_selftest.ray_beam(origins, directions, *ends, common_origin)
+            lo, hi = tree.bounds
+            paths = possible_leaves(nodes, (0,), lo, hi, *judge(core, beam, rejection))
+            entry = core.mlrta_selftest.entry_point(tree, beam, options)
+            assert entry == last_common(list(paths)), (SEED, origins, directions)
+            deep += entry not in (None, 0)
+    assert deep > 5
