@@ -23,16 +23,18 @@ class Geometry:
     face_counts: list[int]
     vertex_normals: list[bool]
     flip_normals: list[bool]
+    warnings: list[str]
 
 
 def gather(shapes: list[Any], names: list[str]) -> Geometry:
     """Copies the meshes out of loaded shapes; ``names`` say in messages which is which.
 
     Raises SceneError for a mesh without faces, with a face that refers to a vertex that
-    does not exist, or with a coordinate or a vertex normal in use that is not finite.
+    does not exist, or with a coordinate that is not finite.
     """
     vertices, faces, normals = [], [], []
     interpolated, flipped, first_faces = [], [], []
+    warnings: list[str] = []
     vertex_count = face_count = 0
     for shape, name in zip(shapes, names, strict=True):
         points = np.array(shape.vertex_positions_buffer(), np.float32).reshape(-1, 3)
@@ -47,6 +49,12 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         directions = np.zeros_like(points)
         if smooth:
             directions = np.array(shape.vertex_normals_buffer(), np.float32).reshape(-1, 3)
+            repaired = repair_normals(directions, points, corners)
+            if repaired:
+                warnings.append(
+                    f"{name} has {repaired} vertex normals that are not finite, as they "
+                    "come about beside degenerate faces: the mean normal of the faces is taken"
+                )
         first_faces.append(face_count)
         vertices.append(points)
         faces.append(corners + np.uint32(vertex_count))
@@ -69,7 +77,33 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         face_counts=[len(f) for f in faces],
         vertex_normals=interpolated,
         flip_normals=flipped,
+        warnings=warnings,
     )
+
+
+def repair_normals(
+    normals: npt.NDArray[np.float32],
+    vertices: npt.NDArray[np.float32],
+    faces: npt.NDArray[np.uint32],
+) -> int:
+    """Replaces vertex normals (V, 3) that are not finite, in place; returns their number.
+
+    Each becomes the mean of the normals of its faces by area. A vertex of faces without an
+    area, which no ray hits, gets an arbitrary unit vector.
+    """
+    bad: npt.NDArray[np.bool_] = np.any(~np.isfinite(normals), axis=1)
+    count = int(np.count_nonzero(bad))
+    if count:
+        around = faces[bad[faces].any(axis=1)]
+        corners = vertices.astype(np.float64)[around]
+        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        sums = np.zeros(vertices.shape, np.float64)
+        np.add.at(sums, around, areas[:, None])
+        lengths = np.linalg.norm(sums[bad], axis=1, keepdims=True)
+        unit = np.divide(sums[bad], lengths, out=np.zeros((count, 3)), where=lengths > 0)
+        unit[lengths[:, 0] == 0] = (0, 0, 1)
+        normals[bad] = unit
+    return count
 
 
 def check_mesh(

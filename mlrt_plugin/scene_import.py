@@ -297,7 +297,7 @@ def collect(
         spp=int(sampler.sample_count()),
         base_seed=int(objects.described(sampler, "base_seed", "0")),
         features=found,
-        warnings=tuple(dict.fromkeys([*warnings, *ignored])),
+        warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
     )
 
 
