@@ -1,5 +1,7 @@
 // What only the tests see of clipping and of the kd-tree's builder.
+#include "bind/arrays.h"
 #include "bind/bind.h"
+#include "bind/build_options.h"
 #include "geometry/clip.h"
 #include "geometry/cover.h"
 #include "geometry/degenerate.h"
@@ -47,62 +49,17 @@ Triangle triangle_of(const std::array<Point, 3> &t) {
 
 template <typename T>
 nb::object array_of(std::vector<T> values) {
-    using Owner = std::unique_ptr<std::vector<T>>;
-    std::vector<T> *kept =
-        Owner(std::make_unique<std::vector<T>>(std::move(values))).release();
-    nb::capsule owner(kept,
-                      [](void *p) noexcept { Owner(static_cast<std::vector<T> *>(p)); });
-    return nb::cast(
-        nb::ndarray<nb::numpy, T, nb::ndim<1>>(kept->data(), {kept->size()}, owner));
-}
-
-BuildOptions options_of(const nb::kwargs &kwargs) {
-    BuildOptions options;
-    for (auto [key, value] : kwargs) {
-        const std::string_view name = nb::cast<const char *>(key);
-        const auto set = [&](std::string_view field, auto &target) {
-            if (name != field)
-                return false;
-            target = nb::cast<std::remove_reference_t<decltype(target)>>(value);
-            return true;
-        };
-        if (!(set("traversal_cost", options.traversal_cost) ||
-              set("intersection_cost", options.intersection_cost) ||
-              set("empty_bonus", options.empty_bonus) || set("clip", options.clip) ||
-              set("rule_empty_cell", options.rule_empty_cell) ||
-              set("rule_flat_cell", options.rule_flat_cell) ||
-              set("rule_area_floor", options.rule_area_floor) ||
-              set("empty_cell_share", options.empty_cell_share) ||
-              set("area_floor", options.area_floor) || set("max_depth", options.max_depth)))
-            throw nb::type_error(("unknown build option " + std::string(name)).c_str());
-    }
-    return options;
-}
-
-nb::dict report_of(const BuildReport &r) {
-    nb::dict d;
-    d["inner_nodes"] = r.inner_nodes;
-    d["leaves"] = r.leaves;
-    d["empty_leaves"] = r.empty_leaves;
-    d["references"] = r.references;
-    d["max_leaf_count"] = r.max_leaf_count;
-    d["depth"] = r.depth;
-    d["empty_cell_splits"] = r.empty_cell_splits;
-    d["flat_cell_splits"] = r.flat_cell_splits;
-    d["area_floor_leaves"] = r.area_floor_leaves;
-    d["dropped_triangles"] = r.dropped_triangles;
-    d["sah_cost"] = r.sah_cost;
-    d["seconds"] = r.seconds;
-    return d;
+    const size_t count = values.size();
+    return to_numpy<T>(std::move(values), {count});
 }
 
 nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
     std::vector<Triangle> triangles = triangles_of(array);
-    const BuildOptions options = options_of(kwargs);
+    const BuildOptions options = build_options_from(kwargs);
     BuiltTree built;
     {
         nb::gil_scoped_release release;
-        built = build_kd_tree(std::move(triangles), options);
+        built = *build_kd_tree(std::move(triangles), options);
     }
     const KdTree &tree = built.tree;
     const size_t n = tree.nodes.size();
@@ -130,7 +87,7 @@ nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
     d["lo"] = point(tree.bounds.lo);
     d["hi"] = point(tree.bounds.hi);
     d["depth"] = tree.depth;
-    d["report"] = report_of(built.report);
+    d["report"] = report_to_dict(built.report);
     return d;
 }
 
@@ -144,8 +101,8 @@ std::optional<std::pair<Point, Point>> clip(const std::array<Point, 3> &triangle
 
 double split_cost(const Point &lo, const Point &hi, int axis, float position,
                   uint64_t lower_count, uint64_t upper_count, const nb::kwargs &kwargs) {
-    return SplitCost(options_of(kwargs), {vec(lo), vec(hi)}, axis)(position, lower_count,
-                                                                   upper_count);
+    return SplitCost(build_options_from(kwargs), {vec(lo), vec(hi)},
+                     axis)(position, lower_count, upper_count);
 }
 
 double uncovered(const std::array<double, 4> &rectangle,

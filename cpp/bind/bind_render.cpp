@@ -1,7 +1,9 @@
 // The function render: a picture as NumPy arrays, with progress and Ctrl-C.
+#include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/scene_handle.h"
 #include "bind/trace_options.h"
+#include "bind/watch.h"
 #include "render/render.h"
 
 #include <chrono>
@@ -9,7 +11,6 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
-#include <optional>
 #include <string>
 
 namespace nb = nanobind;
@@ -32,60 +33,6 @@ about ten times a second.
 Returns a dict: image float32 (H, W, 3) over the film's crop, aovs, counters (fields of
 Counters, base/counters.h, after 'primary_' and 'shadow_'), seconds. Raises ValueError or
 TypeError for bad arguments, KeyboardInterrupt on Ctrl-C, and whatever progress raises.)";
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point begin) {
-    return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-// Looks for Ctrl-C and reports progress, at most about ten times a second. Runs on the
-// thread that called render; remembers an exception until that thread holds the interpreter
-// again.
-class Watch {
-public:
-    explicit Watch(nb::object progress) : progress_(std::move(progress)) {}
-
-    bool operator()(float done) {
-        constexpr double PERIOD = 0.1; // seconds
-        if (error_)
-            return true;
-        if (seconds_since(last_) < PERIOD)
-            return false;
-        const nb::gil_scoped_acquire gil;
-        last_ = Clock::now();
-        try {
-            if (PyErr_CheckSignals() != 0)
-                throw nb::python_error();
-            if (!progress_.is_none())
-                progress_(done);
-        } catch (nb::python_error &error) {
-            error_.emplace(std::move(error));
-        }
-        return error_.has_value();
-    }
-
-    void rethrow() {
-        if (error_)
-            throw std::move(*error_);
-    }
-
-private:
-    nb::object progress_;
-    Clock::time_point last_ = Clock::now();
-    std::optional<nb::python_error> error_;
-};
-
-template <typename T>
-nb::object to_numpy(std::vector<T> &&values, std::initializer_list<size_t> shape) {
-    auto owned = std::make_unique<std::vector<T>>(std::move(values));
-    T *data = owned->data();
-    const nb::capsule owner(owned.get(), [](void *p) noexcept {
-        const std::unique_ptr<std::vector<T>> freed(static_cast<std::vector<T> *>(p));
-    });
-    owned.release();
-    return nb::ndarray<nb::numpy, T>(data, shape, owner).cast();
-}
 
 AovSet aovs_from(const std::vector<std::string> &names) {
     AovSet aovs;
@@ -119,27 +66,28 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     const std::shared_ptr<const PreparedScene> scene = handle.scene;
     RenderResult result;
     Watch watch(std::move(progress));
-    const Clock::time_point begin = Clock::now();
+    const auto begin = std::chrono::steady_clock::now();
     {
         const nb::gil_scoped_release release;
         render(*scene, settings, result, std::ref(watch));
     }
-    const double seconds = seconds_since(begin);
+    const double seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     watch.rethrow();
 
     const size_t height = scene->data.film.crop_height, width = scene->data.film.crop_width;
     nb::dict pictures;
     if (settings.aovs.depth)
-        pictures["depth"] = to_numpy(std::move(result.depth), {height, width});
+        pictures["depth"] = to_numpy<float>(std::move(result.depth), {height, width});
     if (settings.aovs.normal)
-        pictures["normal"] = to_numpy(std::move(result.normal), {height, width, 3});
+        pictures["normal"] = to_numpy<float>(std::move(result.normal), {height, width, 3});
     if (settings.aovs.primitive)
-        pictures["prim"] = to_numpy(std::move(result.primitive), {height, width});
+        pictures["prim"] = to_numpy<int32_t>(std::move(result.primitive), {height, width});
     nb::dict counters;
     counters.update(counters_to_dict(result.counters.primary, "primary_"));
     counters.update(counters_to_dict(result.counters.shadow, "shadow_"));
     nb::dict answer;
-    answer["image"] = to_numpy(std::move(result.image), {height, width, 3});
+    answer["image"] = to_numpy<float>(std::move(result.image), {height, width, 3});
     answer["aovs"] = pictures;
     answer["counters"] = counters;
     answer["seconds"] = seconds;

@@ -1,16 +1,19 @@
 // The kd-tree and ray queries on NumPy arrays.
 #include "base/parallel.h"
 #include "base/simd.h"
+#include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/build_options.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
+#include "bind/watch.h"
 #include "geometry/triangle_test.h"
 
 #include <memory>
 #include <mutex>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
+#include <optional>
 #include <vector>
 
 namespace nb = nanobind;
@@ -23,41 +26,33 @@ using Points = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::devi
 using Faces = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
-// The values as an array of T, which they have the representation of.
-template <typename T, typename Stored>
-nb::ndarray<nb::numpy, T, nb::shape<-1>> to_numpy(std::vector<Stored> &&values) {
-    static_assert(sizeof(T) == sizeof(Stored));
-    auto owned = std::make_unique<std::vector<Stored>>(std::move(values));
-    std::vector<Stored> &vector = *owned;
-    nb::capsule owner(owned.get(), [](void *p) noexcept {
-        delete static_cast<std::vector<Stored> *>(p);
-    });
-    owned.release();
-    return {vector.data(), {vector.size()}, owner};
-}
-
 TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
     const BuildOptions build_options = build_options_from(options);
     const size_t vertex_count = vertices.shape(0), face_count = faces.shape(0);
     if (face_count > 0x7fffffffu)
         throw nb::value_error("a tree holds at most 2^31 - 1 faces");
-    nb::gil_scoped_release release;
-    std::vector<Triangle> triangles(face_count);
-    for (size_t i = 0; i < face_count; ++i) {
-        Vec3f corner[3];
-        for (int j = 0; j < 3; ++j) {
-            const uint32_t v = faces(i, size_t(j));
-            if (v >= vertex_count)
-                throw std::out_of_range("face " + std::to_string(i) + " refers to vertex " +
-                                        std::to_string(v) + ", but there are only " +
-                                        std::to_string(vertex_count));
-            corner[j] = {vertices(v, 0), vertices(v, 1), vertices(v, 2)};
+    Watch watch;
+    std::optional<BuiltTree> built;
+    {
+        nb::gil_scoped_release release;
+        std::vector<Triangle> triangles(face_count);
+        for (size_t i = 0; i < face_count; ++i) {
+            Vec3f corner[3];
+            for (int j = 0; j < 3; ++j) {
+                const uint32_t v = faces(i, size_t(j));
+                if (v >= vertex_count)
+                    throw std::out_of_range("face " + std::to_string(i) +
+                                            " refers to vertex " + std::to_string(v) +
+                                            ", but there are only " +
+                                            std::to_string(vertex_count));
+                corner[j] = {vertices(v, 0), vertices(v, 1), vertices(v, 2)};
+            }
+            triangles[i] = {corner[0], corner[1], corner[2]};
         }
-        triangles[i] = {corner[0], corner[1], corner[2]};
+        built = build_kd_tree(std::move(triangles), build_options, [&] { return watch(); });
     }
-    KeepDenormals keep;
-    BuiltTree built = build_kd_tree(std::move(triangles), build_options);
-    return {std::make_shared<const KdTree>(std::move(built.tree)), built.report};
+    watch.rethrow();
+    return {std::make_shared<const KdTree>(std::move(built->tree)), built->report};
 }
 
 // Rays of a query, one array a component.
@@ -113,16 +108,23 @@ public:
     // counted.
     template <typename Trace>
     Counters for_each_group(uint32_t group_size, Trace &&trace) const {
+        Watch watch;
         Counters total;
         std::mutex mutex;
-        parallel_for(uint32_t((count_ + group_size - 1) / group_size), [&](uint32_t index) {
+        const auto trace_one = [&](uint32_t index) {
             const size_t first = size_t(index) * group_size;
             Counters counters;
             trace(first, group(first, std::min<size_t>(group_size, count_ - first)),
                   counters);
             const std::lock_guard lock(mutex);
             total += counters;
-        });
+        };
+        {
+            nb::gil_scoped_release release;
+            parallel_for(uint32_t((count_ + group_size - 1) / group_size), trace_one,
+                         [&] { return watch(); });
+        }
+        watch.rethrow();
         return total;
     }
 
@@ -143,28 +145,24 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     const RayArrays rays(origins, directions, t_min, t_max);
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> primitive(rays.count());
-    Counters counters;
-    {
-        nb::gil_scoped_release release;
-        counters = rays.for_each_group(
-            group_size(trace_options),
-            [&](size_t first, const RayGroup &group, Counters &c) {
-                trace_closest(*self.tree, group, trace_options,
-                              {t.data() + first, primitive.data() + first}, c);
-                for (size_t i = first; i < first + group.count; ++i)
-                    if (primitive[i] != NO_PRIMITIVE) {
-                        const Vec2f uv = barycentrics(rays.origin(i), rays.direction(i),
-                                                      self.tree->triangles[primitive[i]]);
-                        u[i] = uv.x;
-                        v[i] = uv.y;
-                    }
-            });
-    }
+    const Counters counters = rays.for_each_group(
+        group_size(trace_options), [&](size_t first, const RayGroup &group, Counters &c) {
+            trace_closest(*self.tree, group, trace_options,
+                          {t.data() + first, primitive.data() + first}, c);
+            for (size_t i = first; i < first + group.count; ++i)
+                if (primitive[i] != NO_PRIMITIVE) {
+                    const Vec2f uv = barycentrics(rays.origin(i), rays.direction(i),
+                                                  self.tree->triangles[primitive[i]]);
+                    u[i] = uv.x;
+                    v[i] = uv.y;
+                }
+        });
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::make_tuple(to_numpy<float>(std::move(t)),
-                          to_numpy<int32_t>(std::move(primitive)),
-                          to_numpy<float>(std::move(u)), to_numpy<float>(std::move(v)));
+    return nb::make_tuple(to_numpy<float>(std::move(t), {rays.count()}),
+                          to_numpy<int32_t>(std::move(primitive), {rays.count()}),
+                          to_numpy<float>(std::move(u), {rays.count()}),
+                          to_numpy<float>(std::move(v), {rays.count()}));
 }
 
 nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &directions,
@@ -173,18 +171,13 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     std::vector<uint8_t> occluded(rays.count());
-    Counters counters;
-    {
-        nb::gil_scoped_release release;
-        counters = rays.for_each_group(
-            group_size(trace_options),
-            [&](size_t first, const RayGroup &group, Counters &c) {
-                trace_any(*self.tree, group, trace_options, occluded.data() + first, c);
-            });
-    }
+    const Counters counters = rays.for_each_group(
+        group_size(trace_options), [&](size_t first, const RayGroup &group, Counters &c) {
+            trace_any(*self.tree, group, trace_options, occluded.data() + first, c);
+        });
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::cast(to_numpy<bool>(std::move(occluded)));
+    return to_numpy<bool>(std::move(occluded), {rays.count()});
 }
 
 } // namespace

@@ -62,6 +62,13 @@ int max_splits_of(uint64_t count) {
     return int(DEPTH_OFFSET + DEPTH_PER_DOUBLING * std::log2(double(count)));
 }
 
+// Whoever waits is asked whether to go on at cells of at least this many references: they
+// are few, and what happens below one of the others takes well under a millisecond.
+constexpr uint64_t MIN_CANCELLABLE = 256;
+
+// Unwinds a build that was cancelled.
+struct Cancelled {};
+
 // What the path from the root leaves to a cell.
 struct Allowance {
     int depth;  // levels that are left
@@ -78,8 +85,8 @@ struct Subtree {
 class SweepBuilder {
 public:
     SweepBuilder(KdTree &tree, BuildReport &report, const BuildOptions &options,
-                 uint64_t reference_count)
-        : tree_(tree), report_(report), options_(options),
+                 const std::function<bool()> &cancelled, uint64_t reference_count)
+        : tree_(tree), report_(report), options_(options), cancelled_(cancelled),
           splitter_(tree.triangles, options.clip), scene_area_(surface_area(tree.bounds)),
           area_floor_(area_floor_of(options, reference_count)) {}
 
@@ -87,6 +94,8 @@ public:
     Subtree build(uint32_t node, const Box3f &cell, CellContents contents,
                   const Allowance &allowance) {
         const uint64_t count = contents.count();
+        if (count >= MIN_CANCELLABLE && cancelled_ && cancelled_())
+            throw Cancelled();
         const double area = surface_area(cell);
         if (count == 0 || allowance.depth == 0 || !(area > 0))
             return make_leaf(node, std::move(contents));
@@ -222,6 +231,7 @@ private:
     KdTree &tree_;
     BuildReport &report_;
     const BuildOptions &options_;
+    const std::function<bool()> &cancelled_;
     ContentsSplitter splitter_;
     SweepResult swept_;
     std::vector<CellContents> spare_;
@@ -231,7 +241,9 @@ private:
 
 } // namespace
 
-BuiltTree build_kd_tree(std::vector<Triangle> triangles, const BuildOptions &options) {
+std::optional<BuiltTree> build_kd_tree(std::vector<Triangle> triangles,
+                                       const BuildOptions &options,
+                                       const std::function<bool()> &cancelled) try {
     const KeepDenormals keep_denormals;
     const auto start = std::chrono::steady_clock::now();
     BuiltTree built;
@@ -260,7 +272,7 @@ BuiltTree build_kd_tree(std::vector<Triangle> triangles, const BuildOptions &opt
     if (count == 0) {
         report.leaves = report.empty_leaves = 1;
     } else {
-        SweepBuilder builder(tree, report, options, count);
+        SweepBuilder builder(tree, report, options, cancelled, count);
         const Subtree root =
             builder.build(0, tree.bounds, make_contents(std::move(references)),
                           {max_depth_of(options), max_splits_of(count), MAX_BAD_SPLITS,
@@ -274,6 +286,8 @@ BuiltTree build_kd_tree(std::vector<Triangle> triangles, const BuildOptions &opt
     report.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return built;
+} catch (const Cancelled &) {
+    return std::nullopt;
 }
 
 } // namespace mlrt

@@ -4,6 +4,8 @@
 #include "kdtree/tree.h"
 
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -46,6 +48,8 @@ struct BuiltTree {
 
 // Builds a tree with perfect splits in O(N log N) (Wald and Havran 2006, section 4.3). The
 // tree depends on nothing but the arguments.
-BuiltTree build_kd_tree(std::vector<Triangle> triangles, const BuildOptions &options = {});
+std::optional<BuiltTree> build_kd_tree(std::vector<Triangle> triangles,
+                                       const BuildOptions &options = {},
+                                       const std::function<bool()> &cancelled = {});
 
 } // namespace mlrt

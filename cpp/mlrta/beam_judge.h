@@ -17,7 +17,7 @@ public:
     void visit(uint32_t) { ++counters_.entry_steps; }
 
     Sides sides(uint32_t, KdNode node, const Box3f &cell) const {
-        const SplitPlane plane{node.axis(), node.split()};
+        const AxisPlane plane{node.axis(), node.split()};
         const bool upper_is_near = mlrt::upper_is_near(beam_, plane);
         if (options_.culling == Culling::frustum_planes) {
             Box3f lower = cell, upper = cell;

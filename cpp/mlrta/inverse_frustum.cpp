@@ -56,7 +56,7 @@ bool out_of_reach(const Beam &beam, const Box3f &cell) {
 
 } // namespace
 
-Cull cull_children(const Beam &beam, const Box3f &cell, SplitPlane plane) {
+Cull cull_children(const Beam &beam, const Box3f &cell, AxisPlane plane) {
     const int k = plane.axis;
     const Range &o = beam.origin[k];
     if (o.lo <= plane.position && plane.position <= o.hi)

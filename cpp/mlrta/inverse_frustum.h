@@ -15,17 +15,17 @@ namespace mlrt {
 // always both.
 enum class Cull { near_only, far_only, both };
 
-struct SplitPlane {
+struct AxisPlane {
     int axis;
     double position;
 };
 
 // Step 1, at an inner node with the given cell.
-Cull cull_children(const Beam &beam, const Box3f &cell, SplitPlane plane);
+Cull cull_children(const Beam &beam, const Box3f &cell, AxisPlane plane);
 
 // Whether the upper child is the near one; meaningful unless cull_children() says `both`
 // because the rays start on both sides.
-inline bool upper_is_near(const Beam &beam, SplitPlane plane) {
+inline bool upper_is_near(const Beam &beam, AxisPlane plane) {
     return beam.origin[plane.axis].lo > plane.position;
 }
 
