@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
+import drjit
 import numpy as np
 import pytest
 import workloads
@@ -148,3 +149,22 @@ def test_instruction_sets_agree(options: Options) -> None:
         first, *others = (closest(build(core, scene), rays, options) for core in CORES)
         for other in others:
             other.assert_same(first)
+
+
+@each_core
+def test_number_of_threads_does_not_matter(core: ModuleType) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 200)
+    tree = build(core, scene)
+    rays = workloads.camera(scene, 0, 96)
+    options = ENTRY_POINTS["small tiles"]
+    before = drjit.thread_count()
+    found = []
+    try:
+        for threads in (1, 2, 5):
+            drjit.set_thread_count(threads)
+            found.append(closest(tree, rays, options))
+    finally:
+        drjit.set_thread_count(before)
+    for hits in found:
+        hits.assert_same(closest(tree, rays, BRUTE_FORCE))

@@ -16,7 +16,7 @@ from mlrt_plugin import _dispatch
 # holds. Registers 16 to 31 and masks exist with AVX-512 only.
 AVX512 = r"%zmm|%[xyz]mm(?:1[6-9]|2\d|3[01])\b|\{%k\d\}"
 FORBIDDEN = {"_cpu": r"%[yz]mm|%k\d\b", "_core_avx2": AVX512, "_core_avx512": None}
-PRESENT = {"_cpu": r"%r[as][xp]", "_core_avx2": r"\tvmulss", "_core_avx512": r"\tvmulss"}
+PRESENT = {"_cpu": r"%r[as][xp]", "_core_avx2": r"%ymm", "_core_avx512": r"%zmm"}
 
 
 def module_file(name: str) -> Path:
