@@ -92,6 +92,8 @@ def test_no_path_is_longer_than_stacks_allow() -> None:
     rng = np.random.default_rng(SEED)
     scene = workloads.soup(rng, 3000, 0.5)
     limit = core.kdtree_selftest.max_tree_depth
-    for wanted, allowed in ((0, limit), (1000, limit), (7, 7), (1, 1)):
+    for wanted, allowed in ((0, limit), (limit, limit), (7, 7), (1, 1)):
         options = {"max_depth": wanted, "area_floor": 1e-12, "intersection_cost": 50.0}
         assert 0 < BuiltTree(scene[0][scene[1]], **options).depth <= allowed
+    with pytest.raises(ValueError, match="max_depth"):
+        BuiltTree(scene[0][scene[1]], max_depth=limit + 1)
