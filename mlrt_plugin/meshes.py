@@ -53,7 +53,8 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
             if repaired:
                 warnings.append(
                     f"{name} has {repaired} vertex normals that are not finite, as they "
-                    "come about beside degenerate faces: the mean normal of the faces is taken"
+                    "come about beside degenerate faces: the mean normal of the faces is "
+                    "taken"
                 )
         first_faces.append(face_count)
         vertices.append(points)
