@@ -2,18 +2,19 @@
 
 #include "render/shadow_offset.h"
 
-#include <algorithm>
 #include <numeric>
 
 namespace mlrt {
 
+// A counting sort: it keeps the order of each emitter's candidates.
 void ShadowTracer::sort_by_emitter(std::span<const ShadowCandidate> candidates) {
+    next_.assign(scene_.data.emitters.size() + 1, 0);
+    for (const ShadowCandidate &candidate : candidates)
+        ++next_[candidate.emitter + 1];
+    std::partial_sum(next_.begin(), next_.end(), next_.begin());
     order_.resize(candidates.size());
-    std::iota(order_.begin(), order_.end(), 0u);
-    if (scene_.data.emitters.size() > 1)
-        std::stable_sort(order_.begin(), order_.end(), [&](uint32_t a, uint32_t b) {
-            return candidates[a].emitter < candidates[b].emitter;
-        });
+    for (uint32_t i = 0; i < candidates.size(); ++i)
+        order_[next_[candidates[i].emitter]++] = i;
 }
 
 void ShadowTracer::trace_group(std::span<const ShadowCandidate> candidates,

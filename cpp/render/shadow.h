@@ -57,7 +57,8 @@ private:
     const PreparedScene &scene_;
     const TraceOptions &options_;
     Counters &counters_;
-    std::vector<uint32_t> order_;
+    std::vector<uint32_t> order_; // of the candidates, by emitter
+    std::vector<uint32_t> next_;  // of each emitter: the next free place in order_
     std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
     std::vector<uint8_t> occluded_;
 };
