@@ -210,8 +210,35 @@ def embedded_objects(value: object) -> Iterator[Any]:
             yield from embedded_objects(child)
 
 
-def instantiate(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
-    """Loads a parsed scene, and tells which element each object came from, by its id.
+COLLECTOR = "mlrt_scene_parts"
+"""Plugin that stands in for a scene; registered where scenes are read."""
+
+_collecting: set[str] = set()
+
+
+def register_collector(variant: str) -> None:
+    """Makes a plugin known that keeps what is declared in it, and does nothing else.
+
+    A `scene` would build Mitsuba's own acceleration structure, which takes several times as
+    long as loading the meshes.
+    """
+    if variant in _collecting:
+        return
+    module: Any = getattr(mi, variant)
+
+    class Collector(module.Texture):  # type: ignore[misc]
+        def __init__(self, props: Any) -> None:
+            super().__init__(props)
+            values = (props[name] for name in props.keys())  # noqa: SIM118
+            self.parts = [value for value in values if isinstance(value, mi.Object)]
+
+    module.register_texture(COLLECTOR, Collector)
+    _collecting.add(variant)
+
+
+def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
+    """Loads what a parsed scene declares, in that order, and tells which element each
+    object came from, by its id.
 
     Integrators are not loaded: they are taken over, and may be unknown in the reading
     variant.
@@ -224,10 +251,14 @@ def instantiate(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
             node.props = mi.Properties("direct")
         node.props.set_id(f"n{number}")
         by_id[f"n{number}"] = element
+    register_collector(parsed.config.variant)
+    root = parsed.state.nodes[0]
+    root.props.set_plugin_name(COLLECTOR)
+    root.type = mi.ObjectType.Texture
     with resolving_from(parsed.folder):
-        scene = reported(
+        collector: Any = reported(
             lambda: mi.parser.instantiate(parsed.config, parsed.state),
             parsed.name,
             parsed.elements,
         )
-    return scene, by_id
+    return collector.parts, by_id

@@ -34,6 +34,31 @@ class SceneSummary:
     sensor_count: int
 
 
+@dataclass(frozen=True)
+class LoadedScene:
+    """The objects of a loaded scene, each kind in the order of declaration."""
+
+    shapes: list[Any]
+    emitters: list[Any]
+    sensors: list[Any]
+
+    @staticmethod
+    def of_parts(parts: list[Any]) -> LoadedScene:
+        """Sorts objects by kind, the way a `scene` of Mitsuba does (scene.cpp)."""
+        scene = LoadedScene([], [], [])
+        for part in parts:
+            kind = elements.kind_of(part)
+            if kind == "shape":
+                scene.shapes.append(part)
+                if part.emitter() is not None:
+                    scene.emitters.append(part.emitter())
+            elif kind == "emitter":
+                scene.emitters.append(part)
+            elif kind == "sensor":
+                scene.sensors.append(part)
+        return scene
+
+
 def import_scene(
     scene: SceneSource,
     *,
@@ -71,7 +96,8 @@ def import_scene(
         sensors, sensor = sensors_of(scene, sensor)
         root = elements.from_scene(scene, sensors)
         names: dict[str, Element] = {}
-        loaded, name = scene, "the scene"
+        loaded = LoadedScene(list(scene.shapes()), list(scene.emitters()), sensors)
+        name = "the scene"
     else:
         parsed = parse(scene, defines)
         root, name = parsed.root, f"scene '{parsed.name}'"
@@ -85,9 +111,9 @@ def import_scene(
         check_files(parsed)
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
-        loaded, names = parsing.instantiate(parsed)
-        sensors = list(loaded.sensors())
-    return collect(loaded, names, sensors[sensor], resolution, found, lighting, warnings)
+        parts, names = parsing.instantiate(parsed)
+        loaded = LoadedScene.of_parts(parts)
+    return collect(loaded, names, sensor, resolution, found, lighting, warnings)
 
 
 def summarise(
@@ -235,9 +261,9 @@ def loaded_lighting(scene: Any) -> Lighting:
 
 
 def collect(
-    scene: Any,
+    scene: LoadedScene,
     names: dict[str, Element],
-    sensor: Any,
+    sensor_number: int,
     resolution: tuple[int, int] | None,
     found: tuple[Feature, ...],
     lighting: Lighting,
@@ -253,8 +279,7 @@ def collect(
             )
         return str(element)
 
-    shapes = list(scene.shapes())
-    sources = list(scene.emitters())
+    shapes, sources, sensor = scene.shapes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
