@@ -114,16 +114,6 @@ class Crossing:
         """The float32 parameter that should be reported."""
         return round_to_float32(self.exact)
 
-    @property
-    def is_certain(self) -> bool:
-        """Whether all parameters within a relative 2^-30 of the exact one round to t.
-
-        Where they don't, rounding an accurate but not exact double may give a neighbour.
-        """
-        slack = self.exact * Fraction(1, 2**30)
-        ends = round_to_float32(self.exact - slack), round_to_float32(self.exact + slack)
-        return bool(ends[0] == ends[1])
-
 
 @dataclass(frozen=True)
 class Hit:

@@ -34,10 +34,9 @@ inline SumAndError two_product(double a, double b) {
 
 class Expansion {
 public:
-    // Enough for (difference * difference - difference * difference) . difference, the
-    // largest expression in use: three products of 16 by 2 terms, each of which doubles,
-    // added up.
-    static constexpr int CAPACITY = 192;
+    // Enough for n.a - m (n.d) with n = (difference x difference), a another difference,
+    // d a vector and m a double, the largest expression in use: 192 + 192 terms.
+    static constexpr int CAPACITY = 384;
 
     Expansion() = default;
     explicit Expansion(double value) { append(value); }

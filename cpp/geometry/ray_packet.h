@@ -165,10 +165,11 @@ PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
         absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
     const PlaneDistance<DoublePacket> distance(
         plane, plane_numerator(rays, plane, triangle), direction, max_direction);
-    result.t = FloatPacket(distance.t);
-    for_each_lane(result.hit & ~to_bits(distance.accurate), [&](uint32_t lane) {
-        result.t.entry(lane) = float(
-            exact_distance(rays.origin.of_lane(lane), rays.lane_direction(lane), triangle));
+    result.t = distance.template rounded<FloatPacket>();
+    const LaneBits certain = to_bits(distance.template certain<FloatPacket>());
+    for_each_lane(result.hit & ~certain, [&](uint32_t lane) {
+        result.t.entry(lane) =
+            exact_distance(rays.origin.of_lane(lane), rays.lane_direction(lane), triangle);
     });
     return result;
 }

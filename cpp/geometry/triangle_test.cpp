@@ -77,12 +77,23 @@ HitDecision decide_hit(Vec3f origin, Vec3f direction, const Triangle &triangle) 
             Precision::exact};
 }
 
-double exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+float exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
     const ExactVec3 normal = exact_cross(exact_difference(triangle.b, triangle.a),
                                          exact_difference(triangle.c, triangle.a));
     const Expansion numerator = exact_dot(normal, exact_difference(triangle.a, origin));
     const Expansion denominator = exact_dot(normal, exact_vector(direction));
-    return numerator.estimate() / denominator.estimate();
+    // Each estimate is good to a few 2^-53.
+    const double t = numerator.estimate() / denominator.estimate();
+    const float below = float(t - std::abs(t) * 0x1p-48);
+    const float above = float(t + std::abs(t) * 0x1p-48);
+    if (below == above || !std::isfinite(below) || !std::isfinite(above))
+        return above;
+    // Two neighbouring floats: their midpoint is a double, and t is on one side of it or on
+    // it.
+    const double midpoint = 0.5 * (double(below) + double(above));
+    const Expansion difference = numerator - Expansion(midpoint) * denominator;
+    const int side = difference.sign() * denominator.sign();
+    return side < 0 ? below : side > 0 ? above : float(midpoint);
 }
 
 float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
@@ -90,8 +101,8 @@ float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
     const PlaneNumerator<double> numerator(plane, Vec3d(triangle.a) - Vec3d(origin));
     const Vec3d d(direction);
     const PlaneDistance<double> distance(plane, numerator, d, max_component(abs(d)));
-    return float(distance.accurate ? distance.t
-                                   : exact_distance(origin, direction, triangle));
+    return distance.certain<float>() ? distance.rounded<float>()
+                                     : exact_distance(origin, direction, triangle);
 }
 
 Vec2f barycentrics(Vec3f origin, Vec3f direction, const Triangle &triangle) {

@@ -8,12 +8,11 @@
 // 2012), and the sign of an edge's volume is the same for both triangles that share it, no
 // ray passes between them.
 //
-// The distance is t = n.(a - o) / n.d with n = (b - a) x (c - a), evaluated to 2^-30 and
-// rounded to float once. A hit counts if t_min < t <= t_max, and of several the one with
-// the least t wins, of equal ones the one with the lowest number.
+// The distance is the float nearest to t = n.(a - o) / n.d with n = (b - a) x (c - a), ties
+// to even. A hit counts if t_min < t <= t_max, and of several the one with the least t
+// wins, of equal ones the one with the lowest number.
 //
-// Signs are exact whatever the order of evaluation, so kernels may filter them in any way;
-// the formula of t is written once, here, for scalars and packets.
+// Neither depends on the order of evaluation, so kernels may filter both in any way.
 #pragma once
 
 #include "base/simd.h"
@@ -21,6 +20,7 @@
 #include "geometry/triangle.h"
 
 #include <cstdint>
+#include <limits>
 
 namespace mlrt {
 
@@ -62,7 +62,7 @@ struct TrianglePlane {
     }
 };
 
-// Numerator n.(a - o) of the distance, and whether it is good to 2^-31.
+// Numerator n.(a - o) of the distance, with a bound on its error.
 template <typename Real>
 struct PlaneNumerator {
     Real value;
@@ -79,16 +79,17 @@ struct PlaneNumerator {
     }
 };
 
-// t in double, and whether its relative error is known to be below 2^-30. Where it is not,
-// the caller takes exact_distance(): the choice depends on the ray and the triangle alone,
-// so that all kernels make it alike.
+// t in double with a bound on its error. max_direction is the greatest absolute component
+// of the direction. The numerator may be shared by all lanes (rays with a common origin) or
+// have one value for each.
 //
-// max_direction is the greatest absolute component of the direction. The numerator may be
-// shared by all lanes (rays with a common origin) or have one value for each.
+// With N and D exact, n and d as computed, |N - n| <= e_n and |D - d| <= e_d <= |d| / 2,
+//     |N/D - n/d| <= (e_n + |n/d| e_d) / |D| <= 2 (e_n + |n/d| e_d) / |d|;
+// two more roundings come from the reciprocal and the product with it.
 template <typename Real>
 struct PlaneDistance {
     Real t;
-    MaskOf<Real> accurate;
+    Real error; // NaN or infinite if nothing is known
 
     template <typename Numerator>
     PlaneDistance(const TrianglePlane &plane, const PlaneNumerator<Numerator> &numerator,
@@ -100,17 +101,32 @@ struct PlaneDistance {
             (10 * DOUBLE_ROUNDOFF) *
             ((plane.magnitude.x + plane.magnitude.y) + plane.magnitude.z);
         const Real denominator_error = magnitude * max_direction;
-        t = Real(numerator.value) / denominator;
-        accurate = MaskOf<Real>(numerator.error <= 0x1p-31 * absolute(numerator.value)) &
-                   (denominator_error <= 0x1p-31 * absolute(denominator));
+        const Real reciprocal = 1.0 / denominator;
+        t = numerator.value * reciprocal;
+        const Real absolute_t = absolute(t);
+        error = 2.0 * ((numerator.error + absolute_t * denominator_error) *
+                       absolute(reciprocal)) +
+                (4 * DOUBLE_ROUNDOFF) * absolute_t;
+        error = select(MaskOf<Real>(denominator_error <= 0.5 * absolute(denominator)),
+                       error, Real(std::numeric_limits<double>::infinity()));
+    }
+
+    // The float nearest to t, where `certain`: both ends of the range of t round to it.
+    template <typename Single>
+    Single rounded() const {
+        return Single(t + error);
+    }
+    template <typename Single>
+    MaskOf<Single> certain() const {
+        return Single(t - error) == Single(t + error);
     }
 };
 
-// t by exact numerator and denominator. Only for rays and triangles that decide_hit()
-// accepts.
-double exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle);
+// The float nearest to t, by exact arithmetic. Only for rays and triangles that
+// decide_hit() accepts.
+float exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle);
 
-// t of a ray that decide_hit() accepts, rounded to float.
+// The same, by exact arithmetic only where double precision does not suffice.
 float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle);
 
 // Weights of the vertices b and c at the hit point of a ray that decide_hit() accepts
