@@ -80,8 +80,8 @@ def test_barycentric_coordinates_are_those_of_the_exact_hit(core: ModuleType) ->
         assert found.v[i] == pytest.approx(float(v), abs=2e-6)
 
 
-# A plane whose parameter is the midpoint of two neighbouring floats, or a hair beside it: an
-# error bound of double precision cannot tell how to round, and coincident triangles must
+# A plane whose parameter is the midpoint of two neighbouring floats, or a hair beside it:
+# an error bound of double precision cannot tell how to round, and coincident triangles must
 # agree whatever the order of their vertices.
 @each_core
 @pytest.mark.parametrize(("offset", "rounded"), [(0, 1), (1, 1 + 2**-23), (-1, 1)])
