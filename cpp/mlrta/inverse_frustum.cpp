@@ -27,6 +27,14 @@ Range crossing_parameter(const Beam &beam, int k, double position) {
     return {t.lo - slack, t.hi + slack};
 }
 
+// Whether every ray ends before it crosses the plane {x_k = position}, for k not mixed. A
+// hit counts if its distance is at most t_max once it has been rounded to float, which may
+// be half a unit in the last place less than the exact one.
+bool crosses_beyond_end(const Beam &beam, int k, double position) {
+    constexpr double ROUNDED = 1 + 0x1p-23, SMALLEST_FLOAT = 0x1p-149;
+    return crossing_parameter(beam, k, position).lo > beam.t_max * ROUNDED + SMALLEST_FLOAT;
+}
+
 struct Slab {
     double entry_face, exit_face;
 };
@@ -48,7 +56,7 @@ bool out_of_reach(const Beam &beam, const Box3f &cell) {
         if (beam.heading[k] == Heading::mixed)
             continue;
         if (behind(beam, cell, k) ||
-            crossing_parameter(beam, k, slab_of(beam, cell, k).entry_face).lo > beam.t_max)
+            crosses_beyond_end(beam, k, slab_of(beam, cell, k).entry_face))
             return true;
     }
     return false;
@@ -65,7 +73,7 @@ Cull cull_children(const Beam &beam, const Box3f &cell, AxisPlane plane) {
         return Cull::both;
     if ((plane.position > o.hi) != (beam.heading[k] == Heading::positive))
         return Cull::near_only;
-    if (crossing_parameter(beam, k, plane.position).lo > beam.t_max)
+    if (crosses_beyond_end(beam, k, plane.position))
         return Cull::near_only;
     for (int step = 1; step < 3; ++step) {
         const int j = (k + step) % 3;

@@ -123,6 +123,25 @@ def test_intervals_cut_beams(core: ModuleType, options: Options) -> None:
 
 @each_core
 @each_variant
+def test_beams_may_end_where_a_distance_was_rounded_to(
+    core: ModuleType, options: Options
+) -> None:
+    """A surface whose exact distance exceeds t_max, but whose rounded one does not."""
+    vertices = np.array([(-1, -1, 1), (3, -1, 1), (-1, 3, 1)], np.float32)
+    tree = build(core, (vertices, np.array([(0, 1, 2)], np.uint32)))
+    rounded_down = 0
+    for length in range(3, 100, 2):
+        directions = np.full((16, 3), (0.25 * length, 0.5 * length, length), np.float32)
+        rays = np.zeros_like(directions), directions
+        t_max = np.float32(1 / length)
+        rounded_down += float(t_max) * length < 1
+        assert (closest(tree, rays, options, 0, t_max).t == t_max).all(), length
+        assert occluded(tree, rays, options, 0, t_max).all(), length
+    assert rounded_down > 10
+
+
+@each_core
+@each_variant
 def test_bad_rays_do_not_spoil_their_beam(core: ModuleType, options: Options) -> None:
     rng = np.random.default_rng(SEED)
     scene = workloads.sphere(2)
