@@ -77,7 +77,7 @@ public:
 private:
     // Searches an entry point for the tile's beam, starting at that of the tile it is part
     // of, and splits the tile unless it is small, or its entry point is a leaf and cannot
-    // get any deeper.
+    // get any deeper. A packet is never split.
     void trace_tile(uint32_t first, uint32_t count, const Entry &parent) {
         ++counters_.tiles;
         Beam beam;
@@ -90,7 +90,8 @@ private:
             ++counters_.missed_tiles;
             return;
         }
-        const uint32_t minimum = options_.minimum_tile * options_.minimum_tile;
+        const uint32_t minimum =
+            std::max(options_.minimum_tile * options_.minimum_tile, PACKET_WIDTH);
         if (count <= minimum || tree_.nodes[entry->node].is_leaf()) {
             trace_packets(first, count, *entry);
             return;

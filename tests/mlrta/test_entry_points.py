@@ -16,6 +16,7 @@ from tracing import (
     build,
     closest,
     each_core,
+    interval,
     occluded,
 )
 
@@ -138,6 +139,27 @@ def test_beams_may_end_where_a_distance_was_rounded_to(
         assert (closest(tree, rays, options, 0, t_max).t == t_max).all(), length
         assert occluded(tree, rays, options, 0, t_max).all(), length
     assert rounded_down > 10
+
+
+@each_core
+@pytest.mark.parametrize("count", [1, 15, 16, 17, 40, 100, 255, 257])
+@pytest.mark.parametrize("split_factor", [4, 16])
+@pytest.mark.parametrize("tiles", [(1, 1), (3, 1), (8, 1), (16, 2), (5, 3), (16, 5)])
+def test_tiles_of_any_size_hold_all_rays_once(
+    core: ModuleType, count: int, split_factor: int, tiles: tuple[int, int]
+) -> None:
+    scene = workloads.box()
+    tree = build(core, scene)
+    directions = np.ascontiguousarray(workloads.camera(scene, 0, 17)[1][:count])
+    rays = np.full_like(directions, 0.125), directions
+    options = {"initial_tile": tiles[0], "minimum_tile": tiles[1]}
+    options["split_factor"] = split_factor
+    counters: dict[str, int] = {}
+    ends = interval(rays, 0, np.inf)
+    face = tree.closest_hit(*rays, *ends, options, counters)[1]
+    np.testing.assert_array_equal(face, closest(tree, rays, BRUTE_FORCE).face)
+    assert counters["rays"] == count
+    assert counters["tiles"] >= -(-count // tiles[0] ** 2)
 
 
 @each_core
