@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 
 namespace mlrt {
 
@@ -39,7 +40,11 @@ struct Vec3 {
     friend constexpr Vec3 operator*(Vec3 a, T s) { return {a.x * s, a.y * s, a.z * s}; }
     friend constexpr Vec3 operator*(T s, Vec3 a) { return a * s; }
     friend constexpr Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
-    friend constexpr bool operator==(Vec3 a, Vec3 b) = default;
+    friend constexpr bool operator==(Vec3 a, Vec3 b)
+        requires std::is_arithmetic_v<T>
+    {
+        return a.x == b.x && a.y == b.y && a.z == b.z;
+    }
 };
 
 using Vec2f = Vec2<float>;
