@@ -1,9 +1,9 @@
 """Finds a libLLVM for Mitsuba's llvm variants and hands it to Dr.Jit.
 
 Dr.Jit 1.5 reads ``DRJIT_LIBLLVM_PATH`` once, while ``drjit`` is being imported, and then
-takes what it finds: LLVM 14 it refuses, and with LLVM 15 it compiles kernels that LLVM
-cannot select, which aborts the process. :func:`activate` therefore comes before the first
-import of drjit or mitsuba, and this module imports neither.
+takes what it finds: LLVM 14 it refuses, and with LLVM 15 and 16, which know no llvm.minimum
+on x86, some of its kernels abort the process. :func:`activate` therefore comes before the
+first import of drjit or mitsuba, and this module imports neither.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
-MINIMUM_MAJOR = 16
+MINIMUM_MAJOR = 17
 WHEEL = "karellen-llvm-core"
 # libLLVM of the wheel needs these, in this order; the loader finds them by their names once
 # loaded.

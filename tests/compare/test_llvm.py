@@ -64,8 +64,9 @@ def test_version_is_read_from_the_library(tmp_path: Path) -> None:
     [
         ("libLLVM-14.so.1", None, "is LLVM 14"),
         ("libLLVM-15.so.1", None, "is LLVM 15"),
-        ("libLLVM.so", None, "is older than LLVM 16"),
-        ("libLLVM.so", 15, "is older than LLVM 16"),
+        ("libLLVM-16.so.1", 16, "is LLVM 16"),
+        ("libLLVM.so", None, "is older than LLVM 17"),
+        ("libLLVM.so", 15, "is older than LLVM 17"),
     ],
 )
 def test_users_library_that_is_too_old_is_refused(
@@ -106,6 +107,7 @@ def test_users_library_comes_before_the_systems(
 
 def test_systems_newest_is_taken_and_old_ones_are_passed_over(tmp_path: Path) -> None:
     fake_llvm(tmp_path, "system/libLLVM-15.so.1", None)
+    fake_llvm(tmp_path, "system/libLLVM-16.so.1", 16)
     fake_llvm(tmp_path, "system/libLLVM.so.18.1", 18)
     newest = fake_llvm(tmp_path, "system/libLLVM-20.so.1", 20)
     assert llvm.find().path == newest
