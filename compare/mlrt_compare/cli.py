@@ -1,12 +1,14 @@
 """The command mlrt-compare.
 
-Exit codes: 0 the images agree, 2 they do not, 4 the comparison could not be made.
+Exit codes: 0 the images agree, 2 they do not, 4 the comparison could not be made, 130
+interrupted. With ``MLRT_DEBUG`` set in the environment, errors come with a traceback.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -35,6 +37,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted", file=sys.stderr)
         return INTERRUPTED
+    except Exception as error:
+        if os.environ.get("MLRT_DEBUG"):
+            raise
+        message = " ".join(str(error).split())
+        print(f"{PROGRAM}: {type(error).__name__}: {message}", file=sys.stderr)
+        return COULD_NOT_RUN
 
 
 class CannotRun(Exception):
@@ -61,11 +69,17 @@ def compare_scene(arguments: Sequence[str]) -> int:
 
     # Dr.Jit takes its libLLVM when it is first imported, which the modules below do.
     llvm.activate()
-    from mlrt_plugin.errors import MlrtError
+    try:
+        from mlrt_plugin.errors import MlrtError
 
-    from .outputs import write_outputs
-    from .report import summary
-    from .run import compare
+        from .outputs import write_outputs
+        from .report import summary
+        from .run import compare
+    except ModuleNotFoundError as error:
+        raise CannotRun(
+            f"the package {error.name} is missing: install what comparisons need with "
+            "pip install 'mlrt[compare]'"
+        ) from error
 
     warnings.showwarning = show_warning
     try:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
+from mlrt_plugin.progress import ProgressBar
 from mlrt_plugin.threads import thread_count
 
 from .mitsuba_renderer import MitsubaRenderer
 from .mlrt_renderer import MlrtRenderer
 from .settings import Settings
-from .timing import DEFAULT_ROUNDS, Timings, interleave
+from .timing import DEFAULT_ROUNDS, FRAMES_OF_ROUND, Timings, interleave
 from .validate import Verdict, judge
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -77,13 +81,26 @@ def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
     """Renders the scene on both sides and holds MLRT's image against Mitsuba's.
 
     After one first frame each, both render 2 ``rounds`` frames for the timings, in the
-    order A B B A. Raises MlrtError if a side cannot load the scene.
+    order A B B A. A terminal shows progress, drawn between the frames: loading a side and
+    each frame count as a step. Raises MlrtError if a side cannot load the scene.
     """
-    with thread_count(settings.threads):
-        mlrt = MlrtRenderer(settings)
-        mitsuba = MitsubaRenderer(settings)
-        first_mlrt, first_mitsuba = mlrt.frame(), mitsuba.frame()
-        frames_mlrt, frames_mitsuba = interleave(mlrt.frame, mitsuba.frame, rounds)
+    steps = 4 + FRAMES_OF_ROUND * rounds
+    with thread_count(settings.threads), ProgressBar("comparing") as bar:
+        done = 0
+
+        def step(action: Callable[[], T]) -> T:
+            nonlocal done
+            result = action()
+            done += 1
+            bar(done / steps)
+            return result
+
+        mlrt = step(lambda: MlrtRenderer(settings))
+        mitsuba = step(lambda: MitsubaRenderer(settings))
+        first_mlrt, first_mitsuba = step(mlrt.frame), step(mitsuba.frame)
+        frames_mlrt, frames_mitsuba = interleave(
+            lambda: step(mlrt.frame), lambda: step(mitsuba.frame), rounds
+        )
         threads = int(dr.thread_count())
     timings_mlrt = Timings(mlrt.load, mlrt.build, first_mlrt, frames_mlrt)
     timings_mitsuba = Timings(

@@ -9,6 +9,7 @@ from typing import Any
 
 DEFAULT_ROUNDS = 3
 """Rounds of A B B A: six frames of each renderer, so one slow frame moves no median."""
+FRAMES_OF_ROUND = 4
 
 
 @dataclass(frozen=True)

@@ -148,6 +148,26 @@ def test_unusable_llvm_is_one_sentence(tmp_path: Path) -> None:
     assert not (tmp_path / "output").exists()
 
 
+@pytest.mark.parametrize("package", ["PIL", "mitsuba"])
+def test_missing_package_is_one_sentence(tmp_path: Path, package: str) -> None:
+    """As after an installation without the extra `compare`."""
+    code = f"""
+import sys
+sys.modules["{package}"] = None
+from mlrt_compare.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+    child = python("-c", code, SCENE, *SMALL, "-o", tmp_path / "output")
+    assert_one_sentence(child, package, "pip install 'mlrt[compare]'")
+    assert not (tmp_path / "output").exists()
+
+
+def test_errors_that_nobody_expects_are_one_sentence(tmp_path: Path) -> None:
+    child = python("-c", BENT.format(how="1 / 0"), SCENE, *SMALL, "-o", tmp_path)
+    assert_one_sentence(child, "ZeroDivisionError: division by zero")
+    assert not list(tmp_path.iterdir())
+
+
 def test_help_tells_the_exit_codes() -> None:
     child = command("--help")
     assert child.returncode == 0
