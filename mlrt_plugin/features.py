@@ -19,6 +19,10 @@ FILTERS = ("box", "gaussian")
 SAMPLERS = ("independent",)
 INTEGRATORS = ("direct", "path", "mlrt")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65", "regular", "irregular")
+NO_BSDF_SAMPLES = (
+    "BSDF samples are not taken, so area lights are noisier or less noisy than in Mitsuba; "
+    "the expected image is the same"
+)
 OWN_PARAMETERS = ("hide_emitters", "emitter_samples", "bsdf_samples", *TRACE_OPTIONS)
 """Parameters of the integrator `mlrt`."""
 
@@ -41,6 +45,8 @@ def used_elements(scene: Element, sensor: int) -> Iterator[Element]:
         for number, child in enumerate(scene.children_of(kind)):
             if kind == "sensor" and number != sensor:
                 continue
+            if kind == "emitter" and child.plugin == "area":
+                continue  # it counts where a shape refers to it
             for element in child.walk():
                 if id(element) not in seen:
                     seen.add(id(element))
@@ -85,16 +91,29 @@ def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:
 
 
 def refuse_unsupported(features: tuple[Feature, ...]) -> None:
-    """Raises UnsupportedFeature with all that is not supported, the first by its name."""
+    """Raises UnsupportedFeature with all that is not supported, each by its name."""
     unsupported = [f for f in features if not f.native]
     if not unsupported:
         return
     first = unsupported[0]
-    others = sorted({f"{f.kind} '{f.plugin}'" for f in unsupported[1:]})
     message = f"{first} is not supported: {first.reason}"
-    if len(unsupported) > 1:
-        message += f" ({len(unsupported) - 1} more: {', '.join(others)})"
+    others: dict[str, list[str]] = {}
+    for feature in unsupported[1:]:
+        others.setdefault(f"{feature.kind} '{feature.plugin}'", []).append(
+            place(feature, first.file)
+        )
+    if others:
+        named = [f"{plugin} {', '.join(places)}" for plugin, places in others.items()]
+        message += f"; not supported either: {'; '.join(named)}"
     raise UnsupportedFeature(message)
+
+
+def place(feature: Feature, file: str) -> str:
+    """Where an element is, its file left out if it is the one given."""
+    where = feature.where
+    if file and feature.file == file:
+        where = where.removeprefix(file).lstrip()
+    return " ".join(filter(None, (f"'{feature.id}'" if feature.id else "", where)))
 
 
 def lighting_of(parameters: dict[str, Any], integrator: str) -> Lighting:
@@ -120,65 +139,52 @@ def warnings_about(features: tuple[Feature, ...], lighting: Lighting) -> list[st
     warnings = []
     glowing = any(f.kind == "emitter" and f.plugin == "area" for f in features)
     integrator = lighting.integrator
+    name = next(
+        (str(f) for f in features if (f.kind, f.plugin) == ("integrator", integrator)),
+        f"integrator '{integrator}'",
+    )
     if integrator == "direct":
         if lighting.emitter_samples == 0:
             raise UnsupportedFeature(
-                "integrator 'direct' has emitter_samples = 0, and light is found by "
-                "emitter samples "
+                f"{name} has emitter_samples = 0, and light is found by emitter samples "
                 "only: set emitter_samples to 1"
             )
         if lighting.emitter_samples > 1:
             warnings.append(
-                f"integrator 'direct': emitter_samples = {lighting.emitter_samples} is "
-                "taken as 1; "
+                f"{name}: emitter_samples = {lighting.emitter_samples} is taken as 1; "
                 "raise the samples per pixel instead"
             )
         if lighting.bsdf_samples > 0 and glowing:
-            warnings.append(
-                "integrator 'direct': BSDF samples are not taken, so area lights are "
-                "noisier or "
-                "less noisy than in Mitsuba; the expected image is the same"
-            )
+            warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
     elif integrator == "path":
         depth = int(lighting.parameters.get("max_depth", -1))
         if depth in (0, 1):
             raise UnsupportedFeature(
-                f"integrator 'path' has max_depth = {depth}, which leaves out direct "
-                "illumination, "
+                f"{name} has max_depth = {depth}, which leaves out direct illumination, "
                 "and that is always rendered: set max_depth to 2"
             )
         if depth != 2:
             warnings.append(
-                f"integrator 'path': only direct illumination is rendered (max_depth = 2); "
+                f"{name}: only direct illumination is rendered (max_depth = 2); "
                 f"the further bounces of max_depth = {depth} are missing"
             )
         elif glowing:
-            warnings.append(
-                "integrator 'path': BSDF samples are not taken, so area lights are "
-                "noisier or "
-                "less noisy than in Mitsuba; the expected image is the same"
-            )
+            warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
     elif integrator == "mlrt":
-        for name in lighting.parameters:
-            if name not in OWN_PARAMETERS:
+        for parameter in lighting.parameters:
+            if parameter not in OWN_PARAMETERS:
                 raise UnsupportedFeature(
-                    f"integrator 'mlrt' has no parameter '{name}': choose from "
+                    f"{name} has no parameter '{parameter}': choose from "
                     f"{', '.join(OWN_PARAMETERS)}"
                 )
         if lighting.emitter_samples != 1 or lighting.bsdf_samples != 0:
             raise UnsupportedFeature(
-                "integrator 'mlrt' takes one emitter sample and no BSDF sample: set "
+                f"{name} takes one emitter sample and no BSDF sample: set "
                 "emitter_samples to 1 and bsdf_samples to 0, or leave them out"
             )
     else:
-        warnings.append(
-            f"integrator '{integrator}' is not supported: direct illumination is rendered "
-            "instead"
-        )
+        warnings.append(f"{name} is not supported: direct illumination is rendered instead")
     for feature in features:
         if feature.kind == "sampler" and feature.plugin not in SAMPLERS:
-            warnings.append(
-                f"sampler '{feature.plugin}' is not supported: 'independent' is used "
-                "instead"
-            )
+            warnings.append(f"{feature} is not supported: 'independent' is used instead")
     return warnings

@@ -6,9 +6,11 @@ from collections import Counter
 from collections.abc import Mapping
 
 from .errors import UnsupportedFeature
-from .features import warnings_about
+from .features import INTEGRATORS, SAMPLERS, warnings_about
 from .scene_arrays import Feature
 from .scene_import import SceneSource, import_scene, summarise
+
+TAKEN_OVER = {"integrator": INTEGRATORS, "sampler": SAMPLERS}
 
 
 def scene_report(
@@ -22,7 +24,7 @@ def scene_report(
     lines = [f"sensors: {summary.sensor_count}", "uses:"]
     counts = Counter((f.kind, f.plugin, f.native) for f in summary.features)
     for (kind, plugin, native), count in counts.items():
-        lines.append(f"  {count} x {kind} '{plugin}': {verdict(kind, native)}")
+        lines.append(f"  {count} x {kind} '{plugin}': {verdict(kind, plugin, native)}")
     try:
         warnings = warnings_about(summary.features, summary.lighting)
     except UnsupportedFeature as error:
@@ -49,9 +51,9 @@ def scene_report(
     return [*lines, "the scene is rendered natively"]
 
 
-def verdict(kind: str, native: bool) -> str:
-    if kind in ("integrator", "sampler"):
-        return "taken over"
+def verdict(kind: str, plugin: str, native: bool) -> str:
+    if kind in TAKEN_OVER:
+        return "taken over" if plugin in TAKEN_OVER[kind] else "replaced"
     return "native" if native else "not supported"
 
 

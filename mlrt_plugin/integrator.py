@@ -11,10 +11,12 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+import numpy.typing as npt
 
 from .errors import UnsupportedFeature
 from .options import TRACE_OPTIONS
-from .render import render
+from .render import PreparedScene, prepare
+from .scene_arrays import Lighting
 
 mitsuba: Any = mi
 """For what Mitsuba's type stubs leave out."""
@@ -49,6 +51,7 @@ def integrator_class(module: Any) -> type:
             self.mlrt_parameters = {
                 name: props.get(name) for name in TRACE_OPTIONS if name in props
             }
+            self.prepared: PreparedScene | None = None
 
         def class_name(self) -> str:
             return "MlrtIntegrator"
@@ -65,18 +68,42 @@ def integrator_class(module: Any) -> type:
             develop: bool = True,
             evaluate: bool = True,
         ) -> Any:
-            """Renders natively; the image is not kept in the sensor's film."""
-            result = render(
+            """Renders natively. The tree is kept for the next image of the same meshes."""
+            self.prepared = prepare(
                 scene,
                 sensor=sensor,
-                seed=int(np.asarray(seed).reshape(-1)[0]),
-                spp=spp or None,
-                hide_emitters=self.hide_emitters,
-                **self.mlrt_parameters,
+                lighting=Lighting(
+                    PLUGIN,
+                    **SAMPLE_COUNTS,
+                    hide_emitters=self.hide_emitters,
+                    parameters=self.mlrt_parameters,
+                ),
+                previous=self.prepared,
             )
+            self.prepared.warn(stacklevel=2)
+            result = self.prepared.render(
+                spp=spp or None, seed=int(np.asarray(seed).reshape(-1)[0])
+            )
+            if not isinstance(sensor, mi.Object):
+                sensor = scene.sensors()[sensor]
+            fill_film(module, sensor.film(), result.image)
             return module.TensorXf(result.image) if develop else module.TensorXf()
 
     return MlrtIntegrator
+
+
+def fill_film(module: Any, film: Any, image: npt.NDArray[np.float32]) -> None:
+    """Leaves an image (H, W, 3) in the film, where Mitsuba's integrators leave theirs.
+
+    The film divides by the weight, its last channel, which is 1; so is alpha, if the film
+    has it.
+    """
+    channels = int(film.prepare([]))
+    values = np.ones((*image.shape[:2], channels), np.float32)
+    values[..., :3] = image
+    film.put_block(
+        module.ImageBlock(module.TensorXf(values), offset=film.crop_offset(), border=False)
+    )
 
 
 def register(variant: str | None) -> None:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ._dispatch import core
 from .errors import MlrtError, MlrtWarning
 from .options import AOVS, TRACE_OPTIONS, split_options
-from .scene_arrays import SceneArrays
+from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
 
@@ -48,8 +48,31 @@ class PreparedScene:
 
     arrays: SceneArrays
     handle: Any
-    report: dict[str, Any]
+    tree: Any
+    build_options: dict[str, Any]
     timings: dict[str, float]
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """What the builder did: numbers of nodes, references and splits, cost, seconds."""
+        return dict(self.tree.report)
+
+    def tree_for(self, arrays: SceneArrays, build_options: dict[str, Any]) -> Any:
+        """The tree if it is that of other arrays too, bit for bit, else None."""
+        own = self.arrays
+        same = (
+            build_options == self.build_options
+            and np.array_equal(own.faces, arrays.faces)
+            and np.array_equal(
+                own.vertices.view(np.uint32), arrays.vertices.view(np.uint32)
+            )
+        )
+        return self.tree if same else None
+
+    def warn(self, stacklevel: int = 1) -> None:
+        """Warns of what is approximated or ignored, as if the caller did."""
+        for message in self.arrays.warnings:
+            warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
 
     def render(
         self,
@@ -97,9 +120,15 @@ def prepare(
     defines: Mapping[str, object] | None = None,
     resolution: tuple[int, int] | None = None,
     hide_emitters: bool | None = None,
+    lighting: Lighting | None = None,
+    previous: PreparedScene | None = None,
     **options: Any,
 ) -> PreparedScene:
-    """Reads a scene and builds its tree; `options` are of `BuildOptions`. See `render`."""
+    """Reads a scene and builds its tree; `options` are of `BuildOptions`. See `render`.
+
+    lighting: what to render in place of what the scene's integrator asks for.
+    previous: a scene whose tree is taken over if the geometry is the same.
+    """
     build, trace = split_options(options)
     if trace:
         raise TypeError(f"option '{next(iter(trace))}' is of render, not of prepare")
@@ -107,9 +136,13 @@ def prepare(
     if isinstance(scene, SceneArrays):
         arrays = scene
     else:
-        arrays = import_scene(scene, sensor=sensor, defines=defines, resolution=resolution)
+        arrays = import_scene(
+            scene, sensor=sensor, defines=defines, resolution=resolution, lighting=lighting
+        )
     loaded = time.perf_counter()
-    tree = core.KdTree(arrays.vertices, arrays.faces, **build)
+    tree = previous.tree_for(arrays, build) if previous is not None else None
+    if tree is None:
+        tree = core.KdTree(arrays.vertices, arrays.faces, **build)
     built = time.perf_counter()
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
@@ -124,7 +157,7 @@ def prepare(
         bool(hide),
     )
     timings = {"load": loaded - start, "build": built - loaded}
-    return PreparedScene(arrays, handle, dict(tree.report), timings)
+    return PreparedScene(arrays, handle, tree, build, timings)
 
 
 def render(
@@ -165,8 +198,7 @@ def render(
     checked_seed(seed, 0)
     with thread_count(threads):
         prepared = prepare(scene, sensor=sensor, defines=defines, **of_scene, **build)
-        for message in prepared.arrays.warnings:
-            warnings.warn(message, MlrtWarning, stacklevel=2)
+        prepared.warn(stacklevel=2)
         return prepared.render(spp=spp, seed=seed, aovs=aovs, progress=progress, **trace)
 
 

@@ -95,6 +95,11 @@ class Feature:
     def native(self) -> bool:
         return not self.reason
 
+    @property
+    def file(self) -> str:
+        """The file that declares the element; empty for a dictionary or loaded scene."""
+        return self.where.rpartition(" line ")[0]
+
     def __str__(self) -> str:
         name = f"{self.kind} '{self.plugin}'"
         if self.id:

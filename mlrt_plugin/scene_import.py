@@ -52,7 +52,8 @@ class LoadedScene:
                 scene.shapes.append(part)
                 if part.emitter() is not None:
                     scene.emitters.append(part.emitter())
-            elif kind == "emitter":
+            elif kind == "emitter" and objects.plugin_name(part) != "area":
+                # An area light that stands alone is only declared, for a shape to refer to.
                 scene.emitters.append(part)
             elif kind == "sensor":
                 scene.sensors.append(part)
@@ -65,6 +66,7 @@ def import_scene(
     sensor: Any = 0,
     defines: Mapping[str, object] | None = None,
     resolution: tuple[int, int] | None = None,
+    lighting: Lighting | None = None,
 ) -> SceneArrays:
     """Reads a scene.
 
@@ -74,6 +76,7 @@ def import_scene(
     resolution: (width, height) of the film in pixels in place of the scene's own. The
     field of view follows the film as the scene says, except that of a loaded scene, whose
     horizontal field of view is kept.
+    lighting: what to render in place of what the scene's integrator asks for.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
@@ -104,7 +107,8 @@ def import_scene(
     check_contents(root, sensor, name)
     found = features.list_features(root, sensor)
     features.refuse_unsupported(found)
-    lighting = lighting_of(root) if not is_loaded_scene(scene) else loaded_lighting(scene)
+    if lighting is None:
+        lighting = loaded_lighting(scene) if is_loaded_scene(scene) else lighting_of(root)
     warnings = features.warnings_about(found, lighting)
     if not is_loaded_scene(scene):
         check_transforms(parsed)
@@ -173,7 +177,9 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
     """Raises SceneError unless there is something to see, by something, in some light."""
     if not any(root.children_of("shape")):
         raise SceneError(f"{name} has no shapes: add one")
-    if not any(element.kind == "emitter" for element in root.walk()):
+    alone = [e for e in root.children_of("emitter") if e.plugin != "area"]
+    of_shapes = (e for s in root.children_of("shape") for e in s.walk())
+    if not alone and not any(e.kind == "emitter" for e in of_shapes):
         raise SceneError(f"{name} has no emitter, so its image would be black: add one")
     sensors = list(root.children_of("sensor"))
     if not sensors:

@@ -41,6 +41,10 @@ SCENES = {
     "unknown plugin": ({"shapes": '<shape type="nonsense" id="x"/>'}, "'nonsense'.*'x'"),
     "unknown element": ({"extra": "<foo/>"}, "<foo>"),
     "unclosed element": ({"extra": '<shape type="cube">'}, "line"),
+    "area light of no shape": (
+        {"emitters": '<emitter type="area" id="lost"/>'},
+        "no emitter",
+    ),
     "unknown property": (
         {"shapes": '<shape type="cube"><float name="size" value="1"/></shape>'},
         "size",
@@ -245,3 +249,22 @@ def test_integrators_that_ask_for_something_else(
     )
     with pytest.raises(UnsupportedFeature, match="integrator '"):
         import_scene(scene_file(integrator=integrator))
+
+
+def test_all_that_is_not_supported_is_named(scene_file: SceneFile) -> None:
+    path = scene_file(
+        shapes="""<shape type="sphere" id="ball"><bsdf type="plastic" id="shiny"/></shape>
+<shape type="cylinder" id="tube"/><shape type="cylinder"/>""",
+    )
+    with pytest.raises(UnsupportedFeature) as caught:
+        import_scene(path)
+    text = message_of(caught)
+    assert text.startswith(f"shape 'sphere' with id 'ball' at {path} line 13:2 is not")
+    assert "bsdf 'plastic' 'shiny' line 13:33;" in text
+    assert "shape 'cylinder' 'tube' line 14:2, line 14:36" in text
+
+
+def test_integrator_is_named_with_its_place(scene_file: SceneFile) -> None:
+    path = scene_file(integrator='<integrator type="path" id="way"/>')
+    (warning,) = import_scene(path).warnings
+    assert warning.startswith(f"integrator 'path' with id 'way' at {path} line 3:2: only")

@@ -140,3 +140,60 @@ def test_import_before_and_after_the_variant(
     if run.stdout.startswith("no LLVM"):
         pytest.skip(run.stdout.strip())
     assert (run.returncode, run.stdout) == (0, "done\n"), run.stderr
+
+
+@pytest.mark.parametrize("crop", [False, True])
+def test_image_is_left_in_the_film(
+    scene_file: SceneFile, scalar_variant: None, crop: bool
+) -> None:
+    """As after a rendering by Mitsuba's own integrators."""
+    window = {"crop_width": 7, "crop_height": 5, "crop_offset_x": 3, "crop_offset_y": 2}
+    properties = "".join(f'<integer name="{k}" value="{v}"/>' for k, v in window.items())
+    sensor = scene_files.SENSOR.replace(
+        "<rfilter", (properties if crop else "") + "<rfilter"
+    )
+    scene = mi.load_file(str(scene_file(integrator=OWN, sensor=sensor)))
+    image = np.array(mi.render(scene, spp=3))
+    film = scene.sensors()[0].film()
+    for _ in range(2):
+        np.testing.assert_array_equal(np.array(film.develop()), image)
+        np.testing.assert_array_equal(
+            np.array(film.bitmap(raw=False), np.float32)[..., :3], image
+        )
+        empty = scene.integrator().render(scene, spp=3, develop=False)
+        assert np.array(empty).size == 0
+
+
+def test_tree_is_built_once_for_the_same_meshes(
+    scene_file: SceneFile, scalar_variant: None
+) -> None:
+    path = scene_file(integrator='<integrator type="path"/>')
+    scene = mi.load_file(str(path))
+    integrator = mi.load_dict({"type": "mlrt"})
+    first = np.array(mi.render(scene, integrator=integrator))
+    tree = integrator.prepared.tree
+    parameters = mi.traverse(scene)
+    parameters["lamp.intensity.value"] = [16, 14, 12]
+    parameters.update()
+    second = np.array(mi.render(scene, integrator=integrator))
+    assert integrator.prepared.tree is tree
+    np.testing.assert_allclose(second, 2 * first, rtol=1e-6)
+    parameters["floor.to_world"] = mi.ScalarTransform4f().translate([0.7, 0, 0])
+    parameters.update()
+    third = np.array(mi.render(scene, integrator=integrator))
+    assert integrator.prepared.tree is not tree
+    assert np.any(third != second)
+    fresh = mi.load_dict({"type": "mlrt"})
+    np.testing.assert_array_equal(third, np.array(mi.render(scene, integrator=fresh)))
+
+
+def test_integrator_of_the_scene_does_not_matter(
+    scene_file: SceneFile, scalar_variant: None
+) -> None:
+    """What the scene's own integrator would do is no reason to warn or to refuse."""
+    other = (
+        '<integrator type="direct"><integer name="emitter_samples" value="0"/></integrator>'
+    )
+    scene = mi.load_file(str(scene_file(integrator=other)))
+    image = np.array(mi.render(scene, integrator=mi.load_dict({"type": "mlrt"})))
+    np.testing.assert_array_equal(image, render(scene_file()).image)

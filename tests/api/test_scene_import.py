@@ -346,3 +346,21 @@ def test_variant_of_the_caller_stays_set(
         assert mi.variant() == "scalar_spectral"
     finally:
         mi.set_variant("scalar_rgb")
+
+
+def test_area_light_that_is_declared_apart(scene_file: SceneFile) -> None:
+    """It counts once, at the shape that refers to it, as in Mitsuba."""
+    declared = (
+        '<emitter type="area" id="glow"><rgb name="radiance" value="2, 3, 4"/></emitter>'
+    )
+    scene = import_scene(
+        scene_file(
+            emitters=declared,
+            shapes=scene_files.FLOOR
+            + '<shape type="rectangle" id="panel"><ref id="glow"/></shape>',
+        )
+    )
+    (emitter,) = scene.emitters
+    assert emitter.radiance == (2, 3, 4)
+    assert emitter.shape == 1
+    assert [shape.emitter for shape in scene.shapes] == [NONE, 0]
