@@ -1,5 +1,6 @@
-"""A check of mesh files that Mitsuba does not make: it trusts the indices in PLY and
-serialized files, and crashes on a face that refers to a vertex that does not exist.
+"""Checks of mesh files that Mitsuba does not make: it trusts the indices in PLY and
+serialized files, and crashes on a face that refers to a vertex that does not exist; it
+takes OBJ files that are cut off; and it does not count vertices that are not finite.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from . import obj_files, ply_files
 from .errors import SceneError
-from .ply_indices import triangle_indices
 
 SERIALIZED_MAGIC = 0x041C
 SERIALIZED_NORMALS = 0x0001
@@ -20,29 +21,56 @@ SERIALIZED_TEXCOORDS = 0x0002
 SERIALIZED_COLORS = 0x0008
 SERIALIZED_DOUBLE = 0x2000
 
+UNREADABLE = (OSError, ValueError, LookupError, StopIteration, struct.error, zlib.error)
+"""What reading a damaged file may raise."""
+
 
 def check_mesh_file(path: Path, plugin: str, shape_index: int = 0) -> None:
-    """Raises SceneError if a face of the file refers to a vertex that does not exist.
+    """Raises SceneError if a face of the file refers to a vertex that does not exist, or if
+    an OBJ file is cut off.
 
     Any other defect is left for Mitsuba to report, which reads the file with all its
     contents.
     """
     try:
-        if plugin == "ply":
-            indices, vertex_count = triangle_indices(path)
-        elif plugin == "serialized":
-            indices, vertex_count = serialized_indices(path, shape_index)
-        else:
-            return
-    except (OSError, ValueError, LookupError, StopIteration, struct.error, zlib.error):
-        return
-    bad = indices[(indices < 0) | (indices >= vertex_count)]
-    if bad.size:
-        raise SceneError(
-            f"mesh file '{path}' has a face that refers to vertex {bad.flat[0]} of "
-            f"{vertex_count}: "
-            "repair the mesh or export it anew"
+        defect = (
+            obj_files.defect(path)
+            if plugin == "obj"
+            else bad_index(path, plugin, shape_index)
         )
+    except UNREADABLE:
+        return
+    if defect:
+        raise SceneError(f"mesh file '{path}' {defect}")
+
+
+def bad_index(path: Path, plugin: str, shape_index: int) -> str:
+    """A complaint about a face of a PLY or serialized file, or nothing."""
+    if plugin == "ply":
+        indices, vertex_count = ply_files.triangle_indices(path)
+    elif plugin == "serialized":
+        indices, vertex_count = serialized_indices(path, shape_index)
+    else:
+        return ""
+    bad = indices[(indices < 0) | (indices >= vertex_count)]
+    if not bad.size:
+        return ""
+    return (
+        f"has a face that refers to vertex {bad.flat[0]} of {vertex_count}: repair the "
+        "mesh or export it anew"
+    )
+
+
+def bad_vertices(path: Path, plugin: str) -> tuple[int, int]:
+    """How many vertices of a PLY or OBJ file are NaN or infinite, and how many there are.
+
+    (0, 0) if that cannot be told.
+    """
+    try:
+        points = (ply_files if plugin == "ply" else obj_files).positions(path)
+    except UNREADABLE:
+        return 0, 0
+    return int(np.count_nonzero(~np.isfinite(points).all(axis=1))), len(points)
 
 
 def serialized_indices(path: Path, shape_index: int) -> tuple[npt.NDArray[np.int64], int]:

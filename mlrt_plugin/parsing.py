@@ -17,6 +17,7 @@ import mitsuba as mi
 
 from .elements import Element, from_state
 from .errors import SceneError, one_sentence
+from .mesh_files import bad_vertices
 
 READING_VARIANT = "scalar_rgb"
 
@@ -68,18 +69,17 @@ class ParsedScene:
         return self.elements[0]
 
 
-def unnamed_file(message: str, elements: Sequence[Element]) -> str:
-    """The file of the element that a message is about, if the message does not name it."""
-    for element in elements:
-        filename = str(element.properties.get("filename", ""))
+def failing_element(message: str, elements: Sequence[Element]) -> Element | None:
+    """The element with a file that a message is about, told by its place or its file."""
+    with_files = [e for e in elements if "filename" in e.properties]
+    for element in with_files:
         line, _, column = element.where.rpartition(" line ")[2].partition(":")
-        if (
-            filename
-            and f"(line {line}, col {column})" in message
-            and filename not in message
-        ):
-            return f" in '{filename}'"
-    return ""
+        if element.where and f"(line {line}, col {column})" in message:
+            return element
+    for element in with_files:
+        if f'"{Path(element.properties["filename"]).name}"' in message:
+            return element
+    return None
 
 
 def reported(action: Callable[[], T], name: str, elements: Sequence[Element] = ()) -> T:
@@ -88,10 +88,23 @@ def reported(action: Callable[[], T], name: str, elements: Sequence[Element] = (
         return action()
     except (RuntimeError, ValueError, TypeError, KeyError) as error:
         message = one_sentence(str(error))
+        if "KeyboardInterrupt" in message:
+            # Ctrl-C found Mitsuba in one of the plugins that are written in Python.
+            raise KeyboardInterrupt from None
+        element = failing_element(message, elements)
+        filename = str(element.properties["filename"]) if element is not None else ""
+        if element is not None and element.plugin in ("ply", "obj"):
+            bad, count = bad_vertices(resolved(filename), element.plugin)
+            if bad:
+                raise SceneError(
+                    f"{element} has {bad} of {count} vertices with NaN or infinite "
+                    f"coordinates in '{filename}': repair the mesh"
+                ) from error
         remedy = next((r for p, r in REMEDIES if re.search(p, message)), "mend the scene")
         if name not in message:
             message = f"scene '{name}': {message}"
-        message += unnamed_file(message, elements)
+        if filename not in message:
+            message += f" in '{filename}'"
         raise SceneError(f"{message}; {remedy}") from error
 
 

@@ -62,6 +62,8 @@ def compare_scene(arguments: Sequence[str]) -> int:
         defines=dict(options.define),
     )
     check_output_folder(options.output)
+    if options.json is not None and options.json.is_dir():
+        raise CannotRun(f"the file {options.json} to write figures to is a folder")
     if options.json is not None and not options.json.absolute().parent.is_dir():
         raise CannotRun(
             f"there is no folder {options.json.parent} to write {options.json} to"
@@ -142,7 +144,7 @@ def scene_parser() -> argparse.ArgumentParser:
         type=at_least(0),
         default=0,
         metavar="SENSOR",
-        help="number (0)",
+        help="number of the sensor, from 0 (0)",
     )
     parser.add_argument(
         "-t",

@@ -10,6 +10,7 @@ import pytest
 import scene_files
 
 from mlrt_plugin import MlrtError, SceneError, UnsupportedFeature, import_scene
+from mlrt_plugin.parsing import reported
 
 SceneFile = Callable[..., Path]
 
@@ -138,7 +139,14 @@ MESHES = {
     "truncated.ply": (PLY[:-5], "truncated.ply"),
     "short.ply": (scene_files.ply_bytes(declared_faces=10**6), "short.ply"),
     "text.ply": (scene_files.ply_bytes(text=True)[:-10], "text.ply"),
-    "nan.ply": (scene_files.ply_bytes([(NAN, 0, 0), *scene_files.SQUARE[1:]]), "nan.ply"),
+    "nan.ply": (
+        scene_files.ply_bytes([(NAN, 0, 0), *scene_files.SQUARE[1:]]),
+        "1 of 4.*nan.ply",
+    ),
+    "nan-text.ply": (
+        scene_files.ply_bytes([(NAN, 0, 0), *scene_files.SQUARE[1:]], text=True),
+        "'mesh'.* 1 of 4 vertices with NaN.*nan-text.ply",
+    ),
     "quads.ply": (scene_files.ply_bytes(faces=[(0, 1, 3, 2)]), "quads.ply"),
     "index.ply": (scene_files.ply_bytes(faces=[(0, 1, 99999999)]), "vertex 99999999 of 4"),
     "negative.ply": (scene_files.ply_bytes(faces=[(0, 1, -7)]), "vertex -7 of 4"),
@@ -149,10 +157,17 @@ MESHES = {
     ),
     "truncated.serialized": (scene_files.serialized_bytes()[:34], "truncated.serialized"),
     "index.obj": (scene_files.OBJ.replace("f 1 2 3", "f 1 2 7").encode(), "vertex 7"),
-    "truncated.obj": (scene_files.OBJ[:-4].encode(), "'mesh'.*no faces"),
-    "vertices.obj": (b"v 0 0 0\n", "no faces"),
-    "nan.obj": (scene_files.OBJ.replace("1 0 0", "nan 0 0").encode(), "nan.obj"),
-    "garbage.obj": (bytes(range(256)), "mesh|garbage"),
+    "truncated.obj": (
+        scene_files.OBJ[:-4].encode(),
+        "truncated.obj' ends within its last line 'f 1'",
+    ),
+    "corner.obj": (
+        scene_files.OBJ.encode() + b"vn 0 0 1\nf 1//1 2//1 3/",
+        "corner.obj' ends within its last line 'f 1//1 2//1 3/'",
+    ),
+    "vertices.obj": (b"v 0 0 0\n", "vertices.obj' has no faces"),
+    "nan.obj": (scene_files.OBJ.replace("1 0 0", "nan 0 0").encode(), "1 of 3.*nan.obj"),
+    "garbage.obj": (bytes(range(256)), "garbage.obj' has no faces"),
 }
 
 
@@ -164,6 +179,20 @@ def test_bad_meshes(scene_file: SceneFile, tmp_path: Path, name: str) -> None:
     with pytest.raises(SceneError, match=expected) as caught:
         import_scene(scene_file(shapes=scene_files.mesh_shape(name)))
     message_of(caught)
+
+
+def test_defects_of_files_of_a_dictionary(tmp_path: Path) -> None:
+    path = tmp_path / "nan.ply"
+    path.write_bytes(scene_files.ply_bytes([(0, NAN, 0), *scene_files.SQUARE[1:]]))
+    with pytest.raises(SceneError, match=r"'floor' has 1 of 4 .*nan\.ply") as caught:
+        import_scene(scene_files.scene_dict(floor={"type": "ply", "filename": str(path)}))
+    message_of(caught)
+
+
+def test_obj_file_without_a_last_line_break(scene_file: SceneFile, tmp_path: Path) -> None:
+    (tmp_path / "whole.obj").write_text(scene_files.OBJ.rstrip())
+    scene = import_scene(scene_file(shapes=scene_files.mesh_shape("whole.obj")))
+    assert len(scene.faces) == 1
 
 
 def test_mesh_in_memory_with_bad_vertices(scalar_variant: None) -> None:
@@ -249,6 +278,20 @@ def test_integrators_that_ask_for_something_else(
     )
     with pytest.raises(UnsupportedFeature, match="integrator '"):
         import_scene(scene_file(integrator=integrator))
+
+
+def test_interruption_within_mitsuba_is_no_error_of_the_scene(
+    scalar_variant: None,
+) -> None:
+    """Mitsuba turns what is raised in a plugin written in Python into a RuntimeError."""
+
+    class Interrupted(mi.Texture):  # type: ignore[name-defined,misc]
+        def __init__(self, props: mi.Properties) -> None:
+            raise KeyboardInterrupt
+
+    mi.register_texture("interrupted", Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        reported(lambda: mi.load_dict({"type": "interrupted"}), "scene")
 
 
 def test_all_that_is_not_supported_is_named(scene_file: SceneFile) -> None:

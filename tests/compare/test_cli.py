@@ -121,6 +121,7 @@ def test_wrong_image_fails(tmp_path: Path, how: str) -> None:
         ((SCENE, "-o", SCENE), "not a folder"),
         ((SCENE, "-o", SCENE.parent / "no" / "such"), "no folder"),
         ((SCENE, "--json", SCENE.parent / "no" / "such.json"), "no folder"),
+        ((SCENE, "--json", SCENE.parent), "is a folder"),
     ],
 )
 def test_what_cannot_run_is_one_sentence(

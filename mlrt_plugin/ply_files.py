@@ -1,4 +1,4 @@
-"""The vertex indices of a PLY file of triangles, read apart from its other contents."""
+"""The vertices and the indices of a PLY file of triangles, read apart from the rest."""
 
 from __future__ import annotations
 
@@ -118,6 +118,25 @@ def text_faces(path: Path, header: PlyHeader) -> Faces:
                 column += 3 if len(described) == 3 else 1
         offset += width * element.count
     raise ValueError("no faces")
+
+
+def positions(path: Path) -> npt.NDArray[np.float64]:
+    """(V, 3) coordinates of the vertices, if they come first in the file.
+
+    Raises as `triangle_indices` does.
+    """
+    with path.open("rb") as file:
+        header = read_header(file.read(LONGEST_HEADER))
+    vertices = header.elements[0]
+    names = [f[0] for f in vertices.fields]
+    columns = [names.index(axis) for axis in "xyz"]
+    if header.byte_order:
+        record = np.dtype(vertices.fields)
+        table = np.memmap(path, record, "r", header.size, (vertices.count,))
+        return np.stack([table[names[c]] for c in columns], axis=1).astype(np.float64)
+    tokens = path.read_bytes()[header.size :].split()[: len(names) * vertices.count]
+    rows = np.array(tokens).reshape(vertices.count, len(names))
+    return rows[:, columns].astype(np.float64)
 
 
 def index_field(face: PlyElement) -> str:
