@@ -9,18 +9,23 @@ import drjit as dr
 
 from .errors import MlrtError
 
+MAX_THREADS = 1024
+"""A pool of more than that is a mistake, and may leave none for the rest of the machine."""
+
 
 @contextmanager
 def thread_count(count: int | None) -> Iterator[None]:
     """Runs with as many threads, and restores their number; None leaves it alone.
 
-    Raises MlrtError unless there is at least one.
+    Raises MlrtError unless it is from 1 to MAX_THREADS.
     """
     if count is None:
         yield
         return
     if count < 1:
         raise MlrtError(f"threads = {count} is too few: at least 1 is needed")
+    if count > MAX_THREADS:
+        raise MlrtError(f"threads = {count} is too many: at most {MAX_THREADS} are allowed")
     before = dr.thread_count()
     dr.set_thread_count(count)
     try:

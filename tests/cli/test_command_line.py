@@ -62,6 +62,7 @@ ERRORS = {
     "no samples": (["--spp", "0"], "spp = 0"),
     "no threads": (["-t", "0"], "threads = 0"),
     "negative threads": (["--threads", "-2"], "threads = -2"),
+    "a million threads": (["--threads", "1000000"], "threads = 1000000"),
     "seed": (["--seed", "-1"], "seed = -1"),
     "sensor": (["-s", "3"], "no sensor 3: it has 1"),
     "unused definition": (["-D", "res=3"], "$res=3"),
