@@ -78,21 +78,14 @@ Cull cull_children(const Beam &beam, const Box3f &cell, AxisPlane plane) {
     for (int step = 1; step < 3; ++step) {
         const int j = (k + step) % 3;
         const Range at_plane = crossing(beam, k, plane.position, j);
-        // Beside the cell's slab where it crosses the plane: a ray that starts on that same
-        // side has not reached the slab yet and can meet the cell only beyond the plane; a
-        // ray that starts inside it or past it has left it for good.
-        if (at_plane.hi < cell.lo[j]) {
-            if (beam.origin[j].hi < cell.lo[j])
-                return Cull::far_only;
-            if (beam.origin[j].lo >= cell.lo[j])
-                return Cull::near_only;
-        }
-        if (at_plane.lo > cell.hi[j]) {
-            if (beam.origin[j].lo > cell.hi[j])
-                return Cull::far_only;
-            if (beam.origin[j].hi <= cell.hi[j])
-                return Cull::near_only;
-        }
+        // Beside the cell's slab where it crosses the plane: if all rays start on that same
+        // side, none has reached the slab yet, and they can meet the cell only beyond the
+        // plane. If not, all of them move towards that side: those that start in the slab
+        // or past it have left it, the others move away from it.
+        if (at_plane.hi < cell.lo[j])
+            return beam.origin[j].hi < cell.lo[j] ? Cull::far_only : Cull::near_only;
+        if (at_plane.lo > cell.hi[j])
+            return beam.origin[j].lo > cell.hi[j] ? Cull::far_only : Cull::near_only;
     }
     return Cull::both;
 }

@@ -112,6 +112,24 @@ def test_beams_of_a_camera(core: ModuleType) -> None:
 
 
 @each_core
+def test_points_of_a_camera_s_rays_are_kept(core: ModuleType) -> None:
+    """Rays through a tile's border miss its exact beam by the rounding of directions."""
+    rng = np.random.default_rng(SEED)
+    selftest = core.mlrta_selftest
+    tests = ("may_enter_by_planes", "may_enter_by_slopes", "may_enter_by_parameters")
+    for _ in range(100):
+        _, base, dx, dy = camera(rng)
+        x0, y0 = map(float, rng.integers(0, 60, 2))
+        film = (x0, x0 + 4, y0, y0 + 4)
+        beam = selftest.camera_beam((0, 0, 0), base, dx, dy, *film, np.inf)
+        for offset in rng.choice([0, 0.5, 4], (8, 2)):
+            point = film_direction(base, dx, dy, *np.float32(np.add((x0, y0), offset)))
+            cell = tuple(map(float, point)), tuple(map(float, point))
+            for test in tests:
+                assert getattr(selftest, test)(beam, *cell), (SEED, film, offset, test)
+
+
+@each_core
 @pytest.mark.parametrize("samples", [1, 3])
 def test_beams_of_runs_of_a_tile(core: ModuleType, samples: int) -> None:
     rng = np.random.default_rng(SEED)

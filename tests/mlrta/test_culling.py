@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from types import ModuleType
 from typing import Any
 
@@ -99,6 +100,44 @@ def test_leaves_that_rays_enter_are_kept(
         assert rejected == 0
     else:
         assert rejected > 0.25 * free > 50
+
+
+@each_core
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("axis", "across"), [*itertools.permutations(range(3), 2)])
+def test_rays_in_a_face_of_the_cell_are_kept(
+    core: ModuleType, axis: int, across: int, sign: int
+) -> None:
+    """All numbers are zero there, so nothing is gained from a relative error bound."""
+    origins, directions = np.zeros((2, 2, 3), np.float32)
+    origins[:, axis] = -sign
+    directions[:, axis] = sign, 2 * sign
+    ends = np.zeros(2, np.float32), np.full(2, np.inf, np.float32)
+    beam = core.mlrta_selftest.ray_beam(origins, directions, *ends, True)
+    for lo, hi in ((-1, 0), (0, 1), (0, 0)):
+        cell = np.array([(-1, -1, -1), (1, 1, 1)], np.float32)
+        cell[:, across] = lo, hi
+        lower, upper = (tuple(map(float, corner)) for corner in cell)
+        for position in (-0.5 * sign, 0.0, 0.5 * sign, float(sign)):
+            answer = core.mlrta_selftest.cull_children(beam, lower, upper, axis, position)
+            assert answer == "both", (lo, hi, position)
+        for test in LEAF_TESTS:
+            assert getattr(core.mlrta_selftest, test)(beam, lower, upper), (test, lo, hi)
+
+
+@each_core
+@pytest.mark.parametrize("upwards", [False, True])
+def test_rays_from_both_sides_of_a_face_that_all_leave_it(
+    core: ModuleType, upwards: bool
+) -> None:
+    """Some start in the slab, some beyond it; none can come back."""
+    sign = 1 if upwards else -1
+    origins = np.array([(0, 0.75 * sign, 0), (0, 1.5 * sign, 0)], np.float32)
+    directions = np.array([(1, 0.5 * sign, 0), (1, 0.75 * sign, 0)], np.float32)
+    ends = np.zeros(2, np.float32), np.full(2, np.inf, np.float32)
+    beam = core.mlrta_selftest.ray_beam(origins, directions, *ends, False)
+    answer = core.mlrta_selftest.cull_children(beam, (-1, -1, -1), (2, 1, 1), 0, 1)
+    assert answer == "near_only"
 
 
 @each_core
