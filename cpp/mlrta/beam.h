@@ -77,7 +77,7 @@ bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_
 
 // B2 and B3: the beam of rays as they are. B2 is the case of a common origin, such as a
 // light with the points it may reach. Inactive rays do not count. If there is no active one
-// the beam has mixed headings and an empty origin: it excludes nothing.
+// the beam is that of no ray, and may exclude anything.
 Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count);
 
 } // namespace mlrt

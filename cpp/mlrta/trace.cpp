@@ -157,8 +157,9 @@ private:
         output_.set(first, packet.active, state);
     }
 
-    // One interval serves rays that start apart only if they agree on the order of cells:
-    // calls trace(lanes) for the lanes of each octant of directions.
+    // One interval for rays that go apart would cover most of the tree, so rays without a
+    // common origin are traced by octants of their directions: calls trace(lanes) for the
+    // lanes of each.
     template <typename Trace>
     static void for_each_octant(const RayPacket<Origin> &packet, Trace &&trace) {
         std::array<LaneBits, 3> negative;

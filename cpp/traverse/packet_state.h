@@ -83,8 +83,6 @@ ParameterInterval<FloatPacket> clip_to_cell(const RayPacket<Origin> &rays,
     for (int k = 0; k < 3; ++k)
         interval = clip_to_slab(interval, cell.lo[k] - rays.origin.point[k],
                                 cell.hi[k] - rays.origin.point[k], rays.reciprocal[k]);
-    // Clipping must not revive an empty interval.
-    interval.near = select(active, interval.near, FloatPacket(INFINITE));
     return interval;
 }
 

@@ -1,14 +1,14 @@
 // Intervals of the ray parameter t that rounding never makes too short.
 //
 // Invariant of every traversal here: if a ray has a hit with exact parameter t in a cell,
-// then near <= t (1 - 4u) and t (1 + 4u) <= far for the interval that the cell is visited
-// with, where u = 2^-24. The reported distance differs from t by less than 2u, so a cell
-// may be left out as soon as its near end exceeds a reported distance: no hit in it can be
-// nearer, or equally near.
+// then near <= t (1 - 3u) and t (1 + 3u) <= far for the interval that the cell is visited
+// with, where u = 2^-24. The reported distance is t rounded to float, within u t of it, so
+// a cell may be left out as soon as its near end exceeds a reported distance: no hit in it
+// can be nearer, or equally near.
 //
-// The parameter of a split plane is (s - o) * (1 / d): a difference, a division and a
-// product, each rounded once, hence a relative error below 3.01 u. Widening by SLACK = 8u
-// on the safe side leaves the margin above.
+// The parameter of a split plane is (s - o) * (1 / d), widened by SLACK = 8u on the safe
+// side: a difference, a division and two products, each rounded once, hence a relative
+// error below 4.01 u, which leaves more than the margin above.
 #pragma once
 
 #include "base/simd.h"
