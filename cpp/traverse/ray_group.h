@@ -9,9 +9,10 @@
 namespace mlrt {
 
 // Rays {origin + t * direction, t_min < t <= t_max}, one array a component. Directions need
-// not have unit length; t is in units of the direction. A ray with t_max <= t_min is
-// inactive: it costs nothing and hits nothing. So is one with a component that is not
-// finite or a direction of zero length.
+// not have unit length; t is in units of the direction. Nothing behind the origin is hit: a
+// negative t_min counts as zero. A ray with t_max <= t_min is inactive: it costs nothing
+// and hits nothing. So is one with a component that is not finite or a direction of zero
+// length.
 //
 // Neighbours in the group should be neighbours in space: packets are runs of consecutive
 // rays, and a tile is split into runs of equal length. Pixels in Morton order have that

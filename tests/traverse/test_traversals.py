@@ -117,6 +117,48 @@ def test_sign_of_zero_does_not_matter(core: ModuleType, options: Options) -> Non
 
 
 @each_core
+def test_nothing_behind_the_origin_is_hit(core: ModuleType) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 200)
+    tree = build(core, scene)
+    spread = workloads.from_vertices(rng, scene, 200)
+    for rays in (spread, (np.zeros_like(spread[0]), spread[1])):
+        for options in (BRUTE_FORCE, *TRAVERSALS.values()):
+            ahead = closest(tree, rays, options)
+            assert (ahead.face >= 0).any() and (ahead.face < 0).any()
+            for t_min in (-0.0, -1.0, -np.inf):
+                closest(tree, rays, options, t_min).assert_same(ahead)
+                hit = occluded(tree, rays, options, t_min)
+                np.testing.assert_array_equal(hit, ahead.face >= 0)
+            assert (closest(tree, rays, options, -2.0, -1.0).face == -1).all()
+
+
+@each_core
+@each_traversal
+@pytest.mark.parametrize("common_origin", [False, True])
+@pytest.mark.parametrize("powers", [(-136, -136, -136), (0, -132, 0), (-132, -132, 0)])
+def test_scenes_of_the_size_of_denormal_numbers(
+    core: ModuleType, options: Options, common_origin: bool, powers: tuple[int, int, int]
+) -> None:
+    """Parameters of planes, or reciprocals of directions, are of little use there."""
+    rng = np.random.default_rng(SEED)
+    size = np.float32(2.0 ** np.array(powers))
+    stretch = np.where(np.array(powers) == min(powers), size, np.float32(1))
+    if len(set(powers)) == 1:
+        stretch = np.full(3, 0.7, np.float32)
+    for vertices, faces in (workloads.sphere(2), workloads.stairs()):
+        tree = build(core, (vertices * size, faces))
+        origins, directions = workloads.into_box(rng, (vertices, faces), 600)
+        if common_origin:
+            origins[:] = origins[0]
+            directions = rng.choice(vertices, 600) - origins
+        rays = origins * size, directions * stretch
+        expected = closest(tree, rays, BRUTE_FORCE)
+        assert (expected.face >= 0).mean() > 0.1
+        closest(tree, rays, options).assert_same(expected)
+
+
+@each_core
 @each_traversal
 @pytest.mark.parametrize("count", [0, 1, 2, 7, 8, 9, 15, 16, 17, 33])
 def test_any_number_of_rays(core: ModuleType, options: Options, count: int) -> None:
