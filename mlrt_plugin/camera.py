@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,8 @@ from .scene_arrays import Camera, Film
 
 LARGEST_RADIUS = 64
 """Pixels that a reconstruction filter may reach; chosen, far above any in use."""
-LARGEST_FILM = 1 << 30
-"""Pixels that a film may have; chosen, 12 GiB of colours."""
+BYTES_PER_PIXEL = 64
+"""Of colours and AOVs, twice each while they are summed up; measured."""
 
 
 def read_camera(sensor: Any, name: str) -> Camera:
@@ -61,10 +62,7 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
         raise SceneError(
             f"rfilter '{kind}' of {name} has a radius of {radius:g} pixels: change it"
         )
-    if crop_width * crop_height > LARGEST_FILM:
-        raise SceneError(
-            f"{name} has {crop_width}x{crop_height} pixels, which is too many: reduce it"
-        )
+    check_size(crop_width, crop_height, name)
     warnings = []
     pixels = objects.described(film, "pixel_format", "rgb")
     if pixels != "rgb":
@@ -87,6 +85,19 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
     )
 
 
+def check_size(width: int, height: int, name: str) -> None:
+    """Raises SceneError for a film, in pixels, that does not fit into memory.
+
+    The system would end the process without a word when the memory is written to.
+    """
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if width * height * BYTES_PER_PIXEL > memory:
+        raise SceneError(
+            f"{name} has {width}x{height} pixels, which is too many for the memory of "
+            f"{memory / 2**30:.1f} GiB: reduce it"
+        )
+
+
 def resized(film: Film, resolution: tuple[int, int]) -> Film:
     """The film at another size, in pixels; raises SceneError if it is cropped."""
     size = (film.width, film.height)
@@ -98,6 +109,7 @@ def resized(film: Film, resolution: tuple[int, int]) -> Film:
             "crop"
         )
     width, height = resolution
+    check_size(width, height, "the film")
     return dataclasses.replace(
         film, width=width, height=height, crop_width=width, crop_height=height
     )

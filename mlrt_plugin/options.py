@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 TRACE_OPTIONS = (
@@ -31,6 +32,14 @@ BUILD_OPTIONS = (
 
 AOVS = ("depth", "normal", "prim")
 """Images that can be had beside the colours."""
+
+
+def integer(value: object, name: str) -> int:
+    """A whole number; raises TypeError, which names the argument, for anything else."""
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(f"{name} must be a whole number, not {value!r}") from None
 
 
 def split_options(params: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

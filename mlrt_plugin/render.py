@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .errors import MlrtError, MlrtWarning
-from .options import AOVS, TRACE_OPTIONS, split_options
+from .options import AOVS, TRACE_OPTIONS, integer, split_options
 from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
@@ -203,17 +203,22 @@ def render(
 
 
 def checked_spp(spp: int) -> int:
-    """The number of samples; raises MlrtError unless there is at least one."""
+    """The number of samples; raises MlrtError unless there is at least one, and TypeError
+    for anything but a whole number."""
+    spp = integer(spp, "spp")
     if spp < 1:
         raise MlrtError(f"spp = {spp} is too few: at least 1 sample per pixel is needed")
-    return int(spp)
+    if spp > 0xFFFFFFFF:
+        raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
+    return spp
 
 
 def checked_seed(seed: int, base_seed: int) -> int:
     """The seed of the random numbers, to which Mitsuba adds that of the sampler."""
+    seed = integer(seed, "seed")
     if not 0 <= seed <= 0xFFFFFFFF:
         raise MlrtError(f"seed = {seed} is out of range: it must be from 0 to 2**32 - 1")
-    return (int(seed) + base_seed) & 0xFFFFFFFF
+    return (seed + base_seed) & 0xFFFFFFFF
 
 
 def check_aovs(aovs: Sequence[str]) -> None:

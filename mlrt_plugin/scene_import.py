@@ -18,6 +18,7 @@ from .elements import Element
 from .errors import SceneError
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
+from .options import integer
 from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
 
 SceneSource = Any
@@ -81,6 +82,13 @@ def import_scene(
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
     """
+    if not isinstance(sensor, mi.Object):
+        sensor = integer(sensor, "sensor")
+    if resolution is not None:
+        if isinstance(resolution, str) or len(resolution) != 2:
+            raise ValueError(f"resolution must be (width, height), not {resolution!r}")
+        width, height = resolution
+        resolution = integer(width, "width"), integer(height, "height")
     if resolution is not None and min(resolution) < 1:
         raise SceneError(
             f"resolution {resolution[0]}x{resolution[1]} is too small: both must be at "
@@ -140,7 +148,13 @@ def summarise(
 
 
 def is_loaded_scene(scene: SceneSource) -> bool:
-    return isinstance(scene, mi.Object)
+    """Whether a source is a scene that Mitsuba has loaded; TypeError for other objects."""
+    if not isinstance(scene, mi.Object):
+        return False
+    kind = elements.kind_of(scene)
+    if kind != "scene":
+        raise TypeError(f"a loaded mi.Scene is needed, not a {kind}")
+    return True
 
 
 def sensors_of(scene: Any, sensor: Any) -> tuple[list[Any], int]:

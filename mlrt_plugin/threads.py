@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import drjit as dr
 
 from .errors import MlrtError
+from .options import integer
 
 MAX_THREADS = 1024
 """A pool of more than that is a mistake, and may leave none for the rest of the machine."""
@@ -17,11 +18,12 @@ MAX_THREADS = 1024
 def thread_count(count: int | None) -> Iterator[None]:
     """Runs with as many threads, and restores their number; None leaves it alone.
 
-    Raises MlrtError unless it is from 1 to MAX_THREADS.
+    Raises MlrtError unless it is from 1 to MAX_THREADS, TypeError if it is not whole.
     """
     if count is None:
         yield
         return
+    count = integer(count, "threads")
     if count < 1:
         raise MlrtError(f"threads = {count} is too few: at least 1 is needed")
     if count > MAX_THREADS:

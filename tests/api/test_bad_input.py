@@ -227,6 +227,11 @@ def test_files_that_hold_something_else(tmp_path: Path) -> None:
         import_scene(3)
 
 
+def test_loaded_object_that_is_no_scene(scalar_variant: None) -> None:
+    with pytest.raises(TypeError, match="not a bsdf"):
+        import_scene(mi.load_dict({"type": "diffuse"}))
+
+
 def test_arguments(scene_file: SceneFile) -> None:
     path = scene_file()
     with pytest.raises(SceneError, match=r"unused.*other=3"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -196,6 +197,43 @@ def test_arguments(scene_file: SceneFile) -> None:
             render(path, seed=seed)
     with pytest.raises(UnsupportedFeature, match="sphere"):
         render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("spp", 1.5),
+        ("spp", "many"),
+        ("seed", 1.5),
+        ("sensor", 0.0),
+        ("sensor", "left"),
+        ("threads", 1.5),
+        ("width", (8.5, 8)),
+    ],
+)
+def test_whole_numbers_are_not_rounded(
+    scene_file: SceneFile, name: str, value: object
+) -> None:
+    argument = "resolution" if name == "width" else name
+    with pytest.raises(TypeError, match=f"{name} must be a whole number"):
+        render(scene_file(), **{argument: value})
+
+
+def test_too_much_of_everything(
+    scene_file: SceneFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = scene_file()
+    with pytest.raises(MlrtError, match=r"spp = 4294967296 is too many"):
+        render(path, spp=2**32)
+    with pytest.raises(MlrtError, match="threads = 1000000 is too many"):
+        render(path, threads=1_000_000)
+    with pytest.raises(ValueError, match="must be"):
+        render(path, resolution=(8,))
+    memory = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 100 * 100 * 64 // 4096}
+    monkeypatch.setattr(os, "sysconf", memory.__getitem__)
+    assert render(path, resolution=(99, 100)).image.shape == (100, 99, 3)
+    with pytest.raises(MlrtError, match=r"hdrfilm.* 101x100 pixels.* memory"):
+        render(path, resolution=(101, 100))
 
 
 def test_warnings(scene_file: SceneFile) -> None:
