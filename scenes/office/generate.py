@@ -10,14 +10,13 @@ made.
 
 from __future__ import annotations
 
-import math
-import struct
 import sys
-from collections import defaultdict
 from pathlib import Path
 
-Point = tuple[float, float, float]
-Face = tuple[int, ...]
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from furniture import lamp, mug, screen
+from scene_output import View, ply, point_light, scene_xml, write_files
+from solids import Meshes, Point, turned
 
 WIDTH, DEPTH, HEIGHT = 5.2, 4.4, 2.7
 
@@ -40,79 +39,6 @@ COLOURS = {
     "blue": (0.12, 0.20, 0.50),
     "yellow": (0.76, 0.58, 0.14),
 }
-
-
-class Meshes:
-    """Faces by material. Each object brings vertices of its own, so that every face is
-    flat."""
-
-    def __init__(self) -> None:
-        self.vertices: dict[str, list[Point]] = defaultdict(list)
-        self.faces: dict[str, list[Face]] = defaultdict(list)
-
-    def polygon(self, material: str, *corners: Point) -> None:
-        """A convex polygon, as a fan."""
-        first = len(self.vertices[material])
-        self.vertices[material].extend(corners)
-        for i in range(1, len(corners) - 1):
-            self.faces[material].append((first, first + i, first + i + 1))
-
-    def box(
-        self,
-        material: str,
-        low: Point,
-        high: Point,
-        turn: float = 0.0,
-        about: Point = (0, 0, 0),
-    ) -> None:
-        """A cuboid from ``low`` to ``high``, turned by ``turn`` degrees around a vertical
-        axis."""
-        x, y, z = zip(low, high, strict=True)
-        corners = [
-            turned((x[i & 1], y[i >> 1 & 1], z[i >> 2]), turn, about) for i in range(8)
-        ]
-        for face in (
-            (0, 2, 3, 1),
-            (4, 5, 7, 6),
-            (0, 1, 5, 4),
-            (2, 6, 7, 3),
-            (0, 4, 6, 2),
-            (1, 3, 7, 5),
-        ):
-            self.polygon(material, *(corners[i] for i in face))
-
-    def tube(
-        self,
-        material: str,
-        centre: Point,
-        radii: tuple[float, float],
-        height: float,
-        sides: int = 6,
-    ) -> None:
-        """A vertical cone frustum without its lids: ``radii`` at the bottom and at the
-        top."""
-        rings = [
-            circle(centre, radii[0], 0, sides),
-            circle(centre, radii[1], height, sides),
-        ]
-        for i in range(sides):
-            j = (i + 1) % sides
-            self.polygon(material, rings[0][i], rings[0][j], rings[1][j], rings[1][i])
-
-    def disc(self, material: str, centre: Point, radius: float, sides: int = 6) -> None:
-        self.polygon(material, *circle(centre, radius, 0, sides))
-
-
-def turned(point: Point, degrees: float, about: Point) -> Point:
-    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    x, y = point[0] - about[0], point[1] - about[1]
-    return (about[0] + c * x - s * y, about[1] + s * x + c * y, point[2])
-
-
-def circle(centre: Point, radius: float, lift: float, sides: int) -> list[Point]:
-    angles = (2 * math.pi * (i + 0.5) / sides for i in range(sides))
-    x, y, z = centre
-    return [(x + radius * math.cos(a), y + radius * math.sin(a), z + lift) for a in angles]
 
 
 def room(m: Meshes) -> None:
@@ -169,43 +95,6 @@ def desk_at_the_left(m: Meshes) -> None:
     m.box("blue", (0.42, 1.62, top), (0.7, 1.82, top + 0.04), 9, (0.5, 1.7, 0))
     m.box("yellow", (0.44, 1.63, top + 0.04), (0.68, 1.81, top + 0.07), -7, (0.5, 1.7, 0))
     mug(m, "green", (0.7, 2.75, top))
-
-
-def screen(m: Meshes, foot: Point, turn: float) -> None:
-    """A monitor on its foot; unturned it faces -y."""
-    x, y, z = foot
-    m.box("plastic", (x - 0.12, y - 0.08, z), (x + 0.12, y + 0.08, z + 0.015), turn, foot)
-    m.box(
-        "plastic",
-        (x - 0.03, y + 0.01, z + 0.015),
-        (x + 0.03, y + 0.04, z + 0.2),
-        turn,
-        foot,
-    )
-    m.box(
-        "plastic", (x - 0.3, y - 0.02, z + 0.12), (x + 0.3, y + 0.02, z + 0.5), turn, foot
-    )
-    face = [
-        (x - 0.28, z + 0.14),
-        (x + 0.28, z + 0.14),
-        (x + 0.28, z + 0.48),
-        (x - 0.28, z + 0.48),
-    ]
-    m.polygon("screen", *(turned((a, y - 0.0215, b), turn, foot) for a, b in face))
-
-
-def mug(m: Meshes, material: str, foot: Point) -> None:
-    m.tube(material, foot, (0.035, 0.042), 0.095)
-    m.disc("dark_wood", (foot[0], foot[1], foot[2] + 0.075), 0.04)
-
-
-def lamp(m: Meshes, foot: Point) -> None:
-    x, y, z = foot
-    m.tube("metal", foot, (0.1, 0.08), 0.03)
-    m.disc("metal", (x, y, z + 0.03), 0.08)
-    m.box("metal", (x - 0.012, y - 0.012, z + 0.03), (x + 0.012, y + 0.012, z + 0.46))
-    m.box("metal", (x - 0.25, y - 0.01, z + 0.44), (x + 0.012, y + 0.01, z + 0.46))
-    m.tube("yellow", (x - 0.25, y, z + 0.33), (0.14, 0.05), 0.14)
 
 
 def chair(m: Meshes, foot: Point, turn: float) -> None:
@@ -294,53 +183,9 @@ def build() -> Meshes:
     return m
 
 
-def ply(vertices: list[Point], faces: list[Face]) -> bytes:
-    header = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\n"
-        "property float x\nproperty float y\nproperty float z\n"
-        f"element face {len(faces)}\n"
-        "property list uchar int vertex_indices\nend_header\n"
-    )
-    # Rounded to 10 micrometres: sin and cos may differ in the last place between machines.
-    body = b"".join(struct.pack("<3f", *(round(x, 5) for x in p)) for p in vertices)
-    return header.encode() + body + b"".join(struct.pack("<B3i", 3, *f) for f in faces)
+VIEW = View(68, (4.8, 0.25, 1.75), (1.95, 3.2, 0.62))
 
-
-XML_HEAD = """<?xml version="1.0" encoding="utf-8"?>
-<!-- Written by generate.py. Metres, z up. -->
-<scene version="3.0.0">
-    <default name="spp" value="16"/>
-    <default name="res" value="512"/>
-    <default name="resx" value="$res"/>
-    <default name="resy" value="$res"/>
-    <default name="rfilter" value="box"/>
-
-    <integrator type="direct">
-        <integer name="emitter_samples" value="1"/>
-        <integer name="bsdf_samples" value="0"/>
-    </integrator>
-
-    <sensor type="perspective">
-        <float name="fov" value="68"/>
-        <transform name="to_world">
-            <lookat origin="4.8, 0.25, 1.75" target="1.95, 3.2, 0.62" up="0, 0, 1"/>
-        </transform>
-        <sampler type="independent">
-            <integer name="sample_count" value="$spp"/>
-        </sampler>
-        <film type="hdrfilm">
-            <integer name="width" value="$resx"/>
-            <integer name="height" value="$resy"/>
-            <rfilter type="$rfilter"/>
-        </film>
-    </sensor>
-
-    <emitter type="point" id="room-light">
-        <point name="position" value="3.35, 1.15, 2.3"/>
-        <rgb name="intensity" value="18, 17.2, 15.6"/>
-    </emitter>
-    <emitter type="spot" id="desk-lamp">
+DESK_LAMP = """    <emitter type="spot" id="desk-lamp">
         <transform name="to_world">
             <lookat origin="3.58, 3.85, 1.12" target="3.58, 3.85, 0" up="0, 1, 0"/>
         </transform>
@@ -351,30 +196,17 @@ XML_HEAD = """<?xml version="1.0" encoding="utf-8"?>
     </emitter>
 """
 
-XML_MESH = """
-    <bsdf type="twosided" id="{name}">
-        <bsdf type="diffuse">
-            <rgb name="reflectance" value="{colour}"/>
-        </bsdf>
-    </bsdf>
-    <shape type="ply" id="{name}-mesh">
-        <string name="filename" value="meshes/{name}.ply"/>
-        <boolean name="face_normals" value="true"/>
-        <ref id="{name}"/>
-    </shape>
-"""
-
 
 def write(folder: Path) -> None:
     """Writes office.xml and meshes/*.ply into ``folder``."""
     meshes = build()
-    (folder / "meshes").mkdir(parents=True, exist_ok=True)
-    xml = [XML_HEAD]
-    for name, colour in COLOURS.items():
-        data = ply(meshes.vertices[name], meshes.faces[name])
-        (folder / "meshes" / f"{name}.ply").write_bytes(data)
-        xml.append(XML_MESH.format(name=name, colour=", ".join(map(str, colour))))
-    (folder / "office.xml").write_bytes(("".join(xml) + "</scene>\n").encode())
+    light = point_light("room-light", (3.35, 1.15, 2.3), (18, 17.2, 15.6))
+    plys = (
+        (f"meshes/{name}.ply", ply(meshes.vertices[name], meshes.faces[name]))
+        for name in COLOURS
+    )
+    xml = scene_xml(VIEW, light + DESK_LAMP, COLOURS)
+    write_files(folder, [*plys, ("office.xml", xml)])
 
 
 if __name__ == "__main__":
