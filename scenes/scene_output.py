@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 Rgb = tuple[float, float, float]
 Vector = tuple[float, float, float]
 
-VERTICES_MAXIMUM = 2**31 - 1
 PLY_FACE = np.dtype([("corners", "u1"), ("indices", "<i4", 3)])
 
 
@@ -36,8 +35,6 @@ def ply(vertices: ArrayLike, faces: ArrayLike, decimals: int = 5) -> bytes:
     """
     points = np.round(np.asarray(vertices, dtype=np.float64), decimals).astype("<f4")
     indices = np.asarray(faces)
-    if len(points) > VERTICES_MAXIMUM:
-        raise ValueError(f"a PLY file holds at most {VERTICES_MAXIMUM} vertices")
     header = (
         "ply\nformat binary_little_endian 1.0\n"
         f"element vertex {len(points)}\n"

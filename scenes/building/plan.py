@@ -188,8 +188,13 @@ def plan_for(triangles: int, seed: int) -> tuple[Plan, Draft]:
         plan = plan._replace(bays=plan.bays - 1)
         made = draft(plan, seed)
     while made.assembly.triangles + made.capacity < triangles:
-        plan = plan._replace(bays=plan.bays + 1)
-        made = draft(plan, seed)
+        longer = plan._replace(bays=plan.bays + 1)
+        more = draft(longer, seed)
+        # In a small building one more bay may miss by more than shelves that are full.
+        short = triangles - made.assembly.triangles - made.capacity
+        if more.assembly.triangles - triangles > short:
+            break
+        plan, made = longer, more
     return plan, made
 
 

@@ -4,7 +4,8 @@
 
 The surface is a tube around a spine, closed by a fan at the tip of the tail and at the
 snout, its points moved by scales, plates, a crest and noise down to the size of the
-triangles, nearly all of which are smaller than a pixel at the usual size. Every edge has two faces.
+triangles, nearly all of which are smaller than a pixel at the usual size. Every edge has
+two faces.
 """
 
 from __future__ import annotations
