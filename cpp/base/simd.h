@@ -11,6 +11,8 @@
 
 #include "base/vec.h"
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <drjit/packet.h>
 #include <type_traits>
@@ -79,6 +81,30 @@ T maximum(const T &a, const T &b) {
     }
 }
 
+// Correctly rounded.
+template <typename T>
+T square_root(const T &a) {
+    return drjit::sqrt(a);
+}
+
+// a * b + c, rounded once: every processor we build for has it as an instruction.
+template <typename T>
+T fused(const T &a, const T &b, const T &c) {
+    if constexpr (std::is_arithmetic_v<T>)
+        return std::fma(a, b, c);
+    else
+        return drjit::fmadd(a, b, c);
+}
+
+// The size of a with the sign of b.
+template <typename T>
+T copy_sign(const T &a, const T &b) {
+    if constexpr (std::is_arithmetic_v<T>)
+        return std::copysign(a, b);
+    else
+        return drjit::copysign(a, b);
+}
+
 // Least and greatest lane. Lanes must be ordered (no NaN).
 inline float least_lane(const FloatPacket &a) {
     return drjit::min(a);
@@ -137,6 +163,57 @@ void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
 }
 
+// A value a lane in memory, for what is computed or looked up lane by lane.
+template <typename Value>
+struct alignas(64) LaneArray : std::array<Value, PACKET_WIDTH> {};
+
+template <typename Packet, typename Value>
+Packet load(const LaneArray<Value> &lanes) {
+    return drjit::load_aligned<Packet>(lanes.data());
+}
+
+template <typename Value, typename Packet>
+LaneArray<Value> to_lanes(const Packet &packet) {
+    LaneArray<Value> lanes;
+    drjit::store_aligned(lanes.data(), packet);
+    return lanes;
+}
+
+// Writes the lanes whose bit is set one after the other, and something else behind them:
+// there must be room for a whole packet.
+template <typename Packet, typename Value>
+void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
+    if (bits == ALL_LANES) {
+        store(values, packet);
+        return;
+    }
+#if defined(__AVX512F__)
+    if constexpr (std::is_same_v<Packet, FloatPacket>) {
+        store(values, Packet(_mm512_maskz_compress_ps(__mmask16(bits), packet.m)));
+        return;
+    } else if constexpr (std::is_same_v<Packet, UIntPacket>) {
+        store(values, Packet(_mm512_maskz_compress_epi32(__mmask16(bits), packet.m)));
+        return;
+    }
+#endif
+    const LaneArray<Value> lanes = to_lanes<Value>(packet);
+    for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
+}
+
+// The same vector in all lanes.
+inline Vec3<FloatPacket> in_all_lanes(Vec3f v) {
+    return {FloatPacket(v.x), FloatPacket(v.y), FloatPacket(v.z)};
+}
+
+inline double to_double(float a) {
+    return a;
+}
+inline DoublePacket to_double(const FloatPacket &a) {
+    return DoublePacket(a);
+}
+inline Vec3d to_double(Vec3f v) {
+    return Vec3d(v);
+}
 inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
     return {DoublePacket(v.x), DoublePacket(v.y), DoublePacket(v.z)};
 }

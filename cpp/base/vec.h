@@ -73,7 +73,8 @@ constexpr T max_component(Vec3<T> a) {
 
 template <typename T>
 T length(Vec3<T> a) {
-    return std::sqrt(dot(a, a));
+    using std::sqrt; // packets bring their own
+    return sqrt(dot(a, a));
 }
 
 template <typename T>

@@ -71,9 +71,11 @@ accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &s
     const Film film = film_from(film_dict);
     FilmBlocks blocks(film, 1);
     const PixelRect &sampled = blocks.sampled();
-    for (const auto &[x, y, value] : samples)
+    for (const auto &[x, y, value] : samples) {
+        const float *values = &value;
         blocks.add(uint32_t(int(std::floor(x)) - sampled.x),
-                   uint32_t(int(std::floor(y)) - sampled.y), x, y, &value);
+                   uint32_t(int(std::floor(y)) - sampled.y), 1, &x, &y, &values);
+    }
     std::vector<float> sums, weights;
     for (uint32_t row = 0; row < film.crop_height; ++row)
         for (uint32_t column = 0; column < film.crop_width; ++column) {
@@ -85,7 +87,7 @@ accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &s
 }
 
 nb::dict emitter_sample(const SceneHandle &handle, const Floats3 &p, float x, float y) {
-    const EmitterSample sample = sample_emitter(*handle.scene, vector(p), x, y);
+    const OneEmitterSample sample = sample_emitter(*handle.scene, vector(p), x, y);
     nb::dict result;
     result["emitter"] = sample.emitter == NONE ? -1 : int64_t(sample.emitter);
     result["weight"] = array(sample.weight);
@@ -96,13 +98,13 @@ nb::dict emitter_sample(const SceneHandle &handle, const Floats3 &p, float x, fl
 
 nb::dict hit_surface_of(const SceneHandle &handle, const Floats3 &origin,
                         const Floats3 &direction, uint32_t primitive) {
-    const SurfacePoint point =
-        hit_surface(*handle.scene, vector(origin), vector(direction), primitive);
+    const SurfacePoint<float> point =
+        hit_surface<float>(*handle.scene, vector(origin), vector(direction), primitive);
     nb::dict result;
     result["p"] = array(point.p);
     result["face_normal"] = array(point.face_normal);
     result["shading_normal"] = array(point.shading_normal);
-    result["shape"] = point.shape;
+    result["shape"] = handle.scene->shape_of_face[primitive];
     return result;
 }
 

@@ -1,20 +1,22 @@
 #include "render/emitter_sampling.h"
 
+#include "render/surface.h"
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace mlrt {
 
 namespace {
 
-struct EmitterChoice {
+struct OneChoice {
     uint32_t emitter;
-    float weight; // 1 / probability
-    float reused;
+    float weight, reused;
 };
 
 // Mitsuba's scene.cpp, sample_emitter.
-EmitterChoice choose_emitter(const PreparedScene &scene, float x) {
+OneChoice choose_emitter(const PreparedScene &scene, float x) {
     const uint32_t count = uint32_t(scene.data.emitters.size());
     if (count == 1)
         return {0, 1, x};
@@ -27,33 +29,68 @@ EmitterChoice choose_emitter(const PreparedScene &scene, float x) {
     return {index, float(count), scaled - float(index)};
 }
 
+template <typename Real>
 struct AreaPoint {
-    Vec3f p;
-    Vec3f normal; // unit, on the glowing side
+    Vec3<Real> p;
+    Vec3<Real> normal; // unit, on the glowing side
 };
 
+// Calls function(value) for the values of all lanes.
+template <typename Function>
+float by_lane(float value, Function &&function) {
+    return function(value);
+}
+template <typename Function>
+FloatPacket by_lane(const FloatPacket &values, Function &&function) {
+    LaneArray<float> lanes = to_lanes<float>(values);
+    for (float &value : lanes)
+        value = function(value);
+    return load<FloatPacket>(lanes);
+}
+
+// The face that y chooses, and y made uniform again.
+float choose_face(const EmitterTable &table, uint32_t first_face, float y, uint32_t &face) {
+    const Distribution::Choice choice = table.face_areas.choose(y);
+    face = first_face + choice.index;
+    return choice.reused;
+}
+FloatPacket choose_face(const EmitterTable &table, uint32_t first_face,
+                        const FloatPacket &y, FaceNumbers &faces) {
+    LaneArray<float> lanes = to_lanes<float>(y);
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        lanes[lane] = choose_face(table, first_face, lanes[lane], faces[lane]);
+    return load<FloatPacket>(lanes);
+}
+
+template <typename Real>
+Vec3<Real> spread(Vec3f v) {
+    return {Real(v.x), Real(v.y), Real(v.z)};
+}
+
 // Mitsuba's rectangle.cpp and mesh.cpp, sample_position.
-AreaPoint sample_area(const PreparedScene &scene, const Emitter &emitter,
-                      const EmitterTable &table, float x, float y) {
+template <typename Real>
+AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
+                            const EmitterTable &table, const Real &x, const Real &y) {
     if (emitter.rectangle)
-        return {emitter.corner + x * emitter.edge_u + y * emitter.edge_v, table.normal};
+        return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
+                    y * spread<Real>(emitter.edge_v),
+                spread<Real>(table.normal)};
 
     const Shape &shape = scene.data.shapes[emitter.shape];
-    const Distribution::Choice choice = table.face_areas.choose(y);
-    const uint32_t face = shape.first_face + choice.index;
-    const Triangle &triangle = scene.data.tree->triangles[face];
-    const Vec3f e0 = triangle.b - triangle.a, e1 = triangle.c - triangle.a;
-    const float root = std::sqrt(std::max(1.0f - x, 0.0f));
-    const float b0 = 1.0f - root, b1 = root * choice.reused;
+    FacesOf<Real> faces;
+    const Real reused = choose_face(table, shape.first_face, y, faces);
+    const Corners<Real> corners = corners_of(scene, faces);
+    const Vec3<Real> e0 = corners.b - corners.a, e1 = corners.c - corners.a;
+    const Real root = square_root(maximum(Real(1.0f) - x, Real(0.0f)));
+    const Real b0 = Real(1.0f) - root, b1 = root * reused;
 
-    AreaPoint point;
+    AreaPoint<Real> point;
     for (int k = 0; k < 3; ++k)
-        point.p[k] = std::fma(e0[k], b0, std::fma(e1[k], b1, triangle.a[k]));
+        point.p[k] = fused(e0[k], b0, fused(e1[k], b1, corners.a[k]));
     if (shape.vertex_normals) {
-        const auto &vertices = scene.data.faces[face];
+        const Corners<Real> normals = normals_of(scene, faces);
         point.normal =
-            (1.0f - b0 - b1) * scene.data.normals[vertices[0]] +
-            (b0 * scene.data.normals[vertices[1]] + b1 * scene.data.normals[vertices[2]]);
+            (Real(1.0f) - b0 - b1) * normals.a + (b0 * normals.b + b1 * normals.c);
     } else {
         point.normal = cross(e0, e1);
     }
@@ -73,63 +110,111 @@ float spot_falloff(const Emitter &emitter, const EmitterTable &table, float cosi
     return (emitter.cutoff_angle - angle) * table.inverse_transition;
 }
 
-} // namespace
-
-EmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, float y) {
-    if (scene.data.emitters.empty())
-        return {};
-    const EmitterChoice choice = choose_emitter(scene, x);
-    const Emitter &emitter = scene.data.emitters[choice.emitter];
-    const EmitterTable &table = scene.emitter_tables[choice.emitter];
-    EmitterSample sample;
-    sample.emitter = choice.emitter;
+// Light of one emitter; choice_weight is 1 / the probability that it was chosen.
+template <typename Real>
+EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
+                               const Real &choice_weight, const Vec3<Real> &p,
+                               const Real &x, const Real &y) {
+    const Emitter &emitter = scene.data.emitters[number];
+    const EmitterTable &table = scene.emitter_tables[number];
+    const Real zero(0.0f), one(1.0f);
+    EmitterSample<Real> sample;
+    MaskOf<Real> has_light(true);
+    Real factor = zero;
 
     switch (emitter.type) {
     case EmitterType::point:
     case EmitterType::spot: {
-        const Vec3f to_light = emitter.position - p;
-        const float squared = dot(to_light, to_light);
-        if (!(squared > 0))
-            return {};
-        const float inverse = 1.0f / std::sqrt(squared);
-        sample.target = emitter.position;
+        sample.target = spread<Real>(emitter.position);
+        const Vec3<Real> to_light = sample.target - p;
+        const Real squared = dot(to_light, to_light);
+        has_light = squared > zero;
+        const Real inverse = one / square_root(squared);
         sample.direction = inverse * to_light;
-        float factor = inverse * inverse * choice.weight;
-        if (emitter.type == EmitterType::spot)
-            factor *=
-                spot_falloff(emitter, table, -dot(sample.direction, emitter.direction));
-        sample.weight = factor * emitter.radiance;
+        factor = inverse * inverse * choice_weight;
+        if (emitter.type == EmitterType::spot) {
+            const Real cosine = -dot(sample.direction, spread<Real>(emitter.direction));
+            factor = factor * by_lane(cosine, [&](float lane_cosine) {
+                         return spot_falloff(emitter, table, lane_cosine);
+                     });
+        }
         break;
     }
     case EmitterType::directional: {
         // Far enough away to lie outside of the scene (Mitsuba's directional.cpp).
-        const float distance = 2 * std::max(scene.radius, length(p - scene.center));
-        sample.target = p - distance * emitter.direction;
-        sample.direction = -emitter.direction;
-        sample.weight = choice.weight * emitter.radiance;
+        const Real distance = Real(2.0f) * maximum(Real(scene.radius),
+                                                   length(p - spread<Real>(scene.center)));
+        sample.target = p - distance * spread<Real>(emitter.direction);
+        sample.direction = spread<Real>(-emitter.direction);
+        factor = choice_weight;
         break;
     }
     case EmitterType::area: {
         if (!(table.inverse_area > 0))
-            return {};
-        const AreaPoint point = sample_area(scene, emitter, table, choice.reused, y);
-        const Vec3f to_light = point.p - p;
-        const float squared = dot(to_light, to_light);
-        const float distance = std::sqrt(squared);
+            return {spread<Real>({}), spread<Real>({}), spread<Real>({})};
+        const AreaPoint<Real> point = sample_area(scene, emitter, table, x, y);
+        const Vec3<Real> to_light = point.p - p;
+        const Real squared = dot(to_light, to_light);
+        const Real distance = square_root(squared);
         sample.target = point.p;
-        sample.direction = to_light * (1.0f / distance);
-        const float cosine = dot(sample.direction, point.normal);
+        sample.direction = to_light * (one / distance);
+        const Real cosine = dot(sample.direction, point.normal);
+        const Real density = Real(table.inverse_area) * (squared / -cosine);
         // False also for a point on the light itself, where the direction is not a number.
-        if (!(cosine < 0))
-            return {};
-        const float density = table.inverse_area * (squared / -cosine);
-        if (!(density > 0 && std::isfinite(density)))
-            return {};
-        sample.weight = (choice.weight / density) * emitter.radiance;
+        has_light = (cosine < zero) & (density > zero) & (density < Real(INFINITY));
+        factor = choice_weight / density;
         break;
     }
     }
+    for (int k = 0; k < 3; ++k)
+        sample.weight[k] = select(has_light, factor * Real(emitter.radiance[k]), zero);
     return sample;
+}
+
+} // namespace
+
+OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, float y) {
+    if (scene.data.emitters.empty())
+        return {};
+    const OneChoice choice = choose_emitter(scene, x);
+    return {sample_one(scene, choice.emitter, choice.weight, p, choice.reused, y),
+            choice.emitter};
+}
+
+EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket> &p,
+                              const FloatPacket &x, const FloatPacket &y, LaneBits lanes) {
+    EmitterSamples samples;
+    if (scene.data.emitters.size() == 1) {
+        samples.emitter.fill(0);
+        static_cast<EmitterSample<FloatPacket> &>(samples) =
+            sample_one(scene, 0, FloatPacket(1.0f), p, x, y);
+        return samples;
+    }
+    const LaneArray<float> random = to_lanes<float>(x);
+    LaneArray<float> weight, reused;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const OneChoice choice = choose_emitter(scene, random[lane]);
+        samples.emitter[lane] = choice.emitter;
+        weight[lane] = choice.weight;
+        reused[lane] = choice.reused;
+    }
+    // Lanes that chose the same emitter are served together.
+    const UIntPacket emitters = load<UIntPacket>(samples.emitter);
+    samples.weight = samples.direction = samples.target = spread<FloatPacket>({});
+    while (lanes != 0) {
+        const uint32_t emitter = samples.emitter[uint32_t(std::countr_zero(lanes))];
+        const LaneBits served = to_bits(emitters == UIntPacket(emitter));
+        const EmitterSample<FloatPacket> part = sample_one(
+            scene, emitter, load<FloatPacket>(weight), p, load<FloatPacket>(reused), y);
+        const MaskOf<FloatPacket> mask = from_bits<FloatPacket>(served);
+        for (int k = 0; k < 3; ++k) {
+            samples.weight[k] = select(mask, part.weight[k], samples.weight[k]);
+            samples.direction[k] = select(mask, part.direction[k], samples.direction[k]);
+            samples.target[k] = select(mask, part.target[k], samples.target[k]);
+        }
+        lanes &= ~served;
+    }
+    return samples;
 }
 
 } // namespace mlrt

@@ -1,21 +1,36 @@
-// Choosing a light and a point on it as seen from a point of the scene.
+// Choosing a light and a point on it as seen from points of the scene: for one point, or
+// for sixteen side by side with the same operations and hence the same bits.
 #pragma once
 
+#include "base/simd.h"
 #include "render/prepared_scene.h"
 
 #include <cstdint>
 
 namespace mlrt {
 
+template <typename Real>
 struct EmitterSample {
-    Vec3f weight{};    // unoccluded radiance over probability density; 0: no light here
-    Vec3f direction{}; // unit, towards the light
-    Vec3f target{};    // where the shadow ray ends
+    Vec3<Real> weight;    // unoccluded radiance over probability density; 0: no light here
+    Vec3<Real> direction; // unit, towards the light; any value if there is none
+    Vec3<Real> target;    // where the shadow ray ends; any value if there is none
+};
+
+struct OneEmitterSample : EmitterSample<float> {
     uint32_t emitter = NONE;
+};
+
+// Sixteen samples, each of its own emitter.
+struct EmitterSamples : EmitterSample<FloatPacket> {
+    LaneArray<uint32_t> emitter;
 };
 
 // Light that arrives at p. x and y are uniform in [0, 1); the same numbers give the same
 // sample in Mitsuba.
-EmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, float y);
+OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, float y);
+
+// Lanes that are not asked for get any sample. The scene must have an emitter.
+EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket> &p,
+                              const FloatPacket &x, const FloatPacket &y, LaneBits lanes);
 
 } // namespace mlrt

@@ -24,7 +24,8 @@ FilmBlocks::FilmBlocks(const Film &film, uint32_t channel_count)
                  (channel_count_ + 1));
 }
 
-void FilmBlocks::add(uint32_t column, uint32_t row, float x, float y, const float *values) {
+void FilmBlocks::add(uint32_t column, uint32_t row, uint32_t count, const float *x,
+                     const float *y, const float *const *values) {
     MLRT_CHECK(column < sampled_.width && row < sampled_.height);
     const uint32_t block = row / BLOCK_SIZE * blocks_across_ + column / BLOCK_SIZE;
     const uint32_t inner_column = column % BLOCK_SIZE, inner_row = row % BLOCK_SIZE;
@@ -34,17 +35,30 @@ void FilmBlocks::add(uint32_t column, uint32_t row, float x, float y, const floa
     float *first = sums_.data() +
                    ((size_t(block) * stride_ + inner_row) * stride_ + inner_column) * entry;
     if (filter_.is_box()) {
-        first[0] += 1;
-        for (uint32_t k = 0; k < channel_count_; ++k)
-            first[1 + k] += values[k];
+        first[0] += float(count);
+        for (uint32_t k = 0; k < channel_count_; ++k) {
+            float sum = first[1 + k];
+            for (uint32_t i = 0; i < count; ++i)
+                sum += values[k][i];
+            first[1 + k] = sum;
+        }
         return;
     }
+    const int reach = filter_.reach();
+    const float center_x = float(sampled_.x + int(column) - reach) + 0.5f;
+    const float center_y = float(sampled_.y + int(row) - reach) + 0.5f;
+    for (uint32_t i = 0; i < count; ++i)
+        spread(first, center_x - x[i], center_y - y[i], values, i);
+}
 
+// Adds one sample to the pixels that the filter reaches, of which the first lies (left,
+// top) from the sample.
+void FilmBlocks::spread(float *first, float left, float top, const float *const *values,
+                        uint32_t sample) {
     constexpr int MAX_TAPS = 64;
     const int taps = 2 * filter_.reach() + 1;
+    const size_t entry = channel_count_ + 1;
     MLRT_CHECK(taps <= MAX_TAPS);
-    const float left = float(sampled_.x + int(column) - filter_.reach()) + 0.5f - x;
-    const float top = float(sampled_.y + int(row) - filter_.reach()) + 0.5f - y;
     float weights_x[MAX_TAPS], weights_y[MAX_TAPS];
     for (int i = 0; i < taps; ++i) {
         weights_x[i] = filter_.weight(left + float(i));
@@ -56,7 +70,7 @@ void FilmBlocks::add(uint32_t column, uint32_t row, float x, float y, const floa
             const float weight = weights_x[i] * weights_y[j];
             out[0] += weight;
             for (uint32_t k = 0; k < channel_count_; ++k)
-                out[1 + k] = std::fma(values[k], weight, out[1 + k]);
+                out[1 + k] = std::fma(values[k][sample], weight, out[1 + k]);
         }
     }
 }

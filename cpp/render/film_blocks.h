@@ -22,14 +22,18 @@ public:
     const PixelRect &sampled() const { return sampled_; }
     uint32_t channel_count() const { return channel_count_; }
 
-    // Adds a sample at a film position (x, y) inside the pixel (column, row) of the sampled
-    // rectangle. Calls for pixels of one block must not overlap in time.
-    void add(uint32_t column, uint32_t row, float x, float y, const float *values);
+    // Adds samples at film positions (x[i], y[i]) inside the pixel (column, row) of the
+    // sampled rectangle, with values[channel][i]. Calls for pixels of one block must not
+    // overlap in time.
+    void add(uint32_t column, uint32_t row, uint32_t count, const float *x, const float *y,
+             const float *const *values);
 
     // Sum of weight * value of one pixel of the crop, for each channel, and of the weights.
     float pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const;
 
 private:
+    void spread(float *first, float left, float top, const float *const *values,
+                uint32_t sample);
     const float *at(uint32_t block, int column, int row) const;
 
     Film film_;

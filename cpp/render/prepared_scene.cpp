@@ -52,6 +52,7 @@ PreparedScene::PreparedScene(SceneData scene_data)
     shape_of_face.resize(data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];
+        any_shape_glows |= shape.emitter != NONE;
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 

@@ -25,6 +25,7 @@ struct PreparedScene {
     SceneData data;
     ImagePlane plane;
     std::vector<uint32_t> shape_of_face;
+    bool any_shape_glows = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Vec3f center{};                           // of a sphere around all triangles

@@ -4,6 +4,7 @@
 #include "render/work_items.h"
 
 #include <atomic>
+#include <memory>
 #include <mutex>
 #include <thread>
 
@@ -50,7 +51,6 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     const TileTarget target{blocks, channels,
                             settings.aovs.primitive ? result.primitive.data() : nullptr};
 
-    std::mutex counters_mutex;
     const double all_samples =
         double(sampled.width) * sampled.height * settings.samples_per_pixel;
     std::atomic<uint64_t> samples_done{0};
@@ -61,24 +61,38 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
             stop.store(true, std::memory_order_relaxed);
         return stop.load(std::memory_order_relaxed);
     };
+    // Its buffers are large: as many as there are threads serve all items.
+    std::mutex tiles_mutex;
+    std::vector<std::unique_ptr<TileRenderer>> idle_tiles;
+    const auto take_tile = [&]() -> std::unique_ptr<TileRenderer> {
+        const std::lock_guard lock(tiles_mutex);
+        if (idle_tiles.empty())
+            return std::make_unique<TileRenderer>(scene, streams, settings.trace, target);
+        std::unique_ptr<TileRenderer> tile = std::move(idle_tiles.back());
+        idle_tiles.pop_back();
+        return tile;
+    };
     const std::thread::id caller = std::this_thread::get_id();
     const auto render_item = [&](uint32_t item) {
-        TileRenderer tile(scene, streams, settings.trace, target);
+        std::unique_ptr<TileRenderer> tile = take_tile();
         const bool may_ask = std::this_thread::get_id() == caller;
         items.for_each_group(item, [&](const PixelGroup &group) {
             // An item with many samples takes long: ask before each of its groups.
             if (may_ask ? ask() : stop.load(std::memory_order_relaxed))
                 return;
-            tile.render(group);
+            tile->render(group);
             samples_done.fetch_add(uint64_t(group.pixels.size()) * group.sample_count,
                                    std::memory_order_relaxed);
         });
-        const std::lock_guard lock(counters_mutex);
-        result.counters.primary += tile.counters().primary;
-        result.counters.shadow += tile.counters().shadow;
+        const std::lock_guard lock(tiles_mutex);
+        idle_tiles.push_back(std::move(tile));
     };
     if (!parallel_for(items.count(), render_item, ask) || stop)
         return false;
+    for (const std::unique_ptr<TileRenderer> &tile : idle_tiles) {
+        result.counters.primary += tile->counters().primary;
+        result.counters.shadow += tile->counters().shadow;
+    }
     return parallel_for(film.crop_height, [&](uint32_t row) {
         develop_row(blocks, channels, film, row, result);
     });

@@ -2,6 +2,7 @@
 // them. Equal seeds give equal samples there and here, hence equal noise.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -81,6 +82,22 @@ public:
         const uint32_t pass = sample / samples_per_pass_;
         return {seed_ + pass * 0x9e3779b9u,
                 pixel * samples_per_pass_ + sample % samples_per_pass_};
+    }
+
+    // The streams of consecutive samples of a pixel.
+    void streams(uint32_t pixel, uint32_t first_sample, uint32_t count, uint32_t *seeds,
+                 uint32_t *indices) const {
+        for (uint32_t done = 0; done < count;) {
+            const Stream first = stream(pixel, first_sample + done);
+            const uint32_t left_in_pass =
+                samples_per_pass_ - (first_sample + done) % samples_per_pass_;
+            const uint32_t run = std::min(count - done, left_in_pass);
+            for (uint32_t i = 0; i < run; ++i) {
+                seeds[done + i] = first.seed;
+                indices[done + i] = first.index + i;
+            }
+            done += run;
+        }
     }
 
 private:

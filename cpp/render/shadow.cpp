@@ -2,36 +2,69 @@
 
 #include "render/shadow_offset.h"
 
+#include <bit>
 #include <numeric>
 
 namespace mlrt {
 
-// A counting sort: it keeps the order of each emitter's candidates.
-void ShadowTracer::sort_by_emitter(std::span<const ShadowCandidate> candidates) {
-    next_.assign(scene_.data.emitters.size() + 1, 0);
-    for (const ShadowCandidate &candidate : candidates)
-        ++next_[candidate.emitter + 1];
-    std::partial_sum(next_.begin(), next_.end(), next_.begin());
-    order_.resize(candidates.size());
-    for (uint32_t i = 0; i < candidates.size(); ++i)
-        order_[next_[candidates[i].emitter]++] = i;
+void ShadowCandidates::reset(size_t capacity) {
+    count = 0;
+    const size_t size = capacity + PACKET_WIDTH;
+    if (ray.size() >= size)
+        return;
+    ray.resize(size);
+    emitter.resize(size);
+    for (int k = 0; k < 3; ++k) {
+        origin[k].resize(size);
+        direction[k].resize(size);
+        contribution[k].resize(size);
+    }
 }
 
-void ShadowTracer::trace_group(std::span<const ShadowCandidate> candidates,
+void ShadowCandidates::append(LaneBits lanes, const LaneArray<uint32_t> &of_ray,
+                              const LaneArray<uint32_t> &to_emitter,
+                              const Vec3<FloatPacket> &from, const Vec3<FloatPacket> &to,
+                              const Vec3<FloatPacket> &light) {
+    store_compressed(ray.data() + count, load<UIntPacket>(of_ray), lanes);
+    store_compressed(emitter.data() + count, load<UIntPacket>(to_emitter), lanes);
+    for (int k = 0; k < 3; ++k) {
+        store_compressed(origin[k].data() + count, from[k], lanes);
+        store_compressed(direction[k].data() + count, to[k] - from[k], lanes);
+        store_compressed(contribution[k].data() + count, light[k], lanes);
+    }
+    count += uint32_t(std::popcount(lanes));
+}
+
+// A counting sort: it keeps the order of each emitter's candidates.
+void ShadowTracer::sort_by_emitter(const ShadowCandidates &candidates) {
+    order_.resize(candidates.count);
+    if (scene_.data.emitters.size() == 1) {
+        std::iota(order_.begin(), order_.end(), 0u);
+        return;
+    }
+    next_.assign(scene_.data.emitters.size() + 1, 0);
+    for (uint32_t i = 0; i < candidates.count; ++i)
+        ++next_[candidates.emitter[i] + 1];
+    std::partial_sum(next_.begin(), next_.end(), next_.begin());
+    for (uint32_t i = 0; i < candidates.count; ++i)
+        order_[next_[candidates.emitter[i]]++] = i;
+}
+
+void ShadowTracer::trace_group(const ShadowCandidates &candidates,
                                std::span<const uint32_t> group, const Emitter &emitter) {
     const size_t count = group.size();
     const bool from_light =
         emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+    const float sign = from_light ? -1.0f : 1.0f;
     for (int k = 0; k < 3; ++k) {
-        origin_[k].resize(from_light ? 0 : count);
         direction_[k].resize(count);
-        for (size_t i = 0; i < count; ++i) {
-            const ShadowCandidate &candidate = candidates[group[i]];
-            const float reach = candidate.target[k] - candidate.origin[k];
-            direction_[k][i] = from_light ? -reach : reach;
-            if (!from_light)
-                origin_[k][i] = candidate.origin[k];
-        }
+        for (size_t i = 0; i < count; ++i)
+            direction_[k][i] = sign * candidates.direction[k][group[i]];
+        if (from_light)
+            continue;
+        origin_[k].resize(count);
+        for (size_t i = 0; i < count; ++i)
+            origin_[k][i] = candidates.origin[k][group[i]];
     }
     t_min_.assign(count, from_light ? SHADOW_EPSILON : 0.0f);
     t_max_.assign(count, from_light ? 1.0f : 1.0f - SHADOW_EPSILON);

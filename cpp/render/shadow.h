@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/counters.h"
+#include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/prepared_scene.h"
 
@@ -11,16 +12,26 @@
 
 namespace mlrt {
 
-// Light that reaches a point unless something is in the way.
-struct ShadowCandidate {
-    uint32_t ray = 0; // which camera ray it is for
-    uint32_t emitter = 0;
-    Vec3f origin{}; // off the surface: see shadow_offset.h
-    Vec3f target{}; // on the light, or beyond the scene for a directional one
-    Vec3f contribution{};
+// Light that reaches points unless something is in the way. One array a component, with
+// room for a packet behind the last entry.
+struct ShadowCandidates {
+    uint32_t count = 0;
+    std::vector<uint32_t> ray; // which camera ray it is for
+    std::vector<uint32_t> emitter;
+    std::vector<float> origin[3];    // off the surface: see shadow_offset.h
+    std::vector<float> direction[3]; // to the light, or beyond the scene for one far away
+    std::vector<float> contribution[3];
+
+    // Empties the arrays and makes room for a number of entries.
+    void reset(size_t capacity);
+
+    // Adds the lanes whose bit is set.
+    void append(LaneBits lanes, const LaneArray<uint32_t> &of_ray,
+                const LaneArray<uint32_t> &to_emitter, const Vec3<FloatPacket> &from,
+                const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light);
 };
 
-// Calls visible(candidate) for those that nothing occludes, each emitter's in the order
+// Calls visible(i) for the candidates i that nothing occludes, each emitter's in the order
 // given.
 //
 // The rays of one emitter are traced as one group. For point and spot lights they start at
@@ -33,26 +44,26 @@ public:
         : scene_(scene), options_(options), counters_(counters) {}
 
     template <typename Visible>
-    void trace(std::span<const ShadowCandidate> candidates, Visible &&visible) {
+    void trace(const ShadowCandidates &candidates, Visible &&visible) {
         sort_by_emitter(candidates);
-        for (size_t begin = 0; begin < order_.size();) {
-            const uint32_t emitter = candidates[order_[begin]].emitter;
-            size_t end = begin;
-            while (end < order_.size() && candidates[order_[end]].emitter == emitter)
+        for (uint32_t begin = 0; begin < candidates.count;) {
+            const uint32_t emitter = candidates.emitter[order_[begin]];
+            uint32_t end = begin;
+            while (end < candidates.count && candidates.emitter[order_[end]] == emitter)
                 ++end;
             const std::span<const uint32_t> group(order_.data() + begin, end - begin);
             trace_group(candidates, group, scene_.data.emitters[emitter]);
             for (size_t i = 0; i < group.size(); ++i)
                 if (!occluded_[i])
-                    visible(candidates[group[i]]);
+                    visible(group[i]);
             begin = end;
         }
     }
 
 private:
-    void sort_by_emitter(std::span<const ShadowCandidate> candidates);
-    void trace_group(std::span<const ShadowCandidate> candidates,
-                     std::span<const uint32_t> group, const Emitter &emitter);
+    void sort_by_emitter(const ShadowCandidates &candidates);
+    void trace_group(const ShadowCandidates &candidates, std::span<const uint32_t> group,
+                     const Emitter &emitter);
 
     const PreparedScene &scene_;
     const TraceOptions &options_;

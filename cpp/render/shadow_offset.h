@@ -2,9 +2,8 @@
 // renderer.
 #pragma once
 
+#include "base/simd.h"
 #include "base/vec.h"
-
-#include <cmath>
 
 namespace mlrt {
 
@@ -15,11 +14,14 @@ inline constexpr float SHADOW_EPSILON = 10 * RAY_EPSILON;
 
 // A point off the surface, on the side that `towards` points to (Mitsuba's interaction.h).
 // The normal is the geometric one and has unit length.
-inline Vec3f offset_point(Vec3f p, Vec3f normal, Vec3f towards) {
-    const float size = (1.0f + max_component(abs(p))) * RAY_EPSILON;
-    const float signed_size = std::copysign(size, dot(normal, towards));
-    return {std::fma(signed_size, normal.x, p.x), std::fma(signed_size, normal.y, p.y),
-            std::fma(signed_size, normal.z, p.z)};
+template <typename Real>
+Vec3<Real> offset_point(const Vec3<Real> &p, const Vec3<Real> &normal,
+                        const Vec3<Real> &towards) {
+    const Real largest = maximum(absolute(p.x), maximum(absolute(p.y), absolute(p.z)));
+    const Real size = (Real(1.0f) + largest) * Real(RAY_EPSILON);
+    const Real signed_size = copy_sign(size, dot(normal, towards));
+    return {fused(signed_size, normal.x, p.x), fused(signed_size, normal.y, p.y),
+            fused(signed_size, normal.z, p.z)};
 }
 
 } // namespace mlrt

@@ -13,67 +13,101 @@ namespace mlrt {
 
 namespace {
 
-bool is_black(Vec3f colour) {
-    return colour == Vec3f{};
+LaneBits not_black(const Vec3<FloatPacket> &colour) {
+    const FloatPacket zero(0.0f);
+    return to_bits((colour.x != zero) | (colour.y != zero) | (colour.z != zero));
+}
+
+// What the sides that the rays see reflect.
+Vec3<FloatPacket> albedo_of(const PreparedScene &scene, const FaceNumbers &faces,
+                            LaneBits seen_from_front) {
+    const auto of_lane = [&](uint32_t lane) -> Vec3f {
+        const Shape &shape = scene.data.shapes[scene.shape_of_face[faces[lane]]];
+        if (shape.material == NONE)
+            return {};
+        const Material &material = scene.data.materials[shape.material];
+        return (seen_from_front >> lane & 1) ? material.front : material.back;
+    };
+    LaneArray<float> colour[3];
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const Vec3f albedo = of_lane(lane);
+        for (int k = 0; k < 3; ++k)
+            colour[k][lane] = albedo[k];
+    }
+    return {load<FloatPacket>(colour[0]), load<FloatPacket>(colour[1]),
+            load<FloatPacket>(colour[2])};
+}
+
+Vec3<FloatPacket> load_vectors(const std::vector<float> (&components)[3], size_t first) {
+    return {load<FloatPacket>(components[0].data() + first),
+            load<FloatPacket>(components[1].data() + first),
+            load<FloatPacket>(components[2].data() + first)};
 }
 
 } // namespace
 
-void TileRenderer::Rays::resize(size_t count, size_t channels) {
+void TileRenderer::Rays::resize(size_t new_count, size_t channels) {
+    count = new_count;
+    const size_t whole = (count + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
     for (std::vector<float> *array : {&film_x, &film_y, &light_x, &light_y, &t_min, &t_max,
                                       &t, &direction[0], &direction[1], &direction[2]})
-        array->resize(count);
+        array->resize(whole);
     for (std::vector<uint32_t> *array : {&stream_seed, &stream_index, &primitive})
-        array->resize(count);
-    values.assign(count * channels, 0.0f);
+        array->resize(whole);
+    std::fill(primitive.begin() + ptrdiff_t(count), primitive.end(), NO_PRIMITIVE);
+    values.resize(channels);
+    for (std::vector<float> &channel : values)
+        channel.assign(whole, 0.0f);
 }
 
 void TileRenderer::render(const PixelGroup &group) {
     rays_.resize(group.pixels.size() * group.sample_count, target_.channels.count);
-    candidates_.clear();
-    passing_.clear();
+    candidates_.reset(rays_.count);
     generate(group);
     trace_camera_rays(group);
     shade_hits();
     pass_hidden_emitters();
-    shadow_tracer_.trace(candidates_, [&](const ShadowCandidate &candidate) {
-        float *values = &rays_.values[size_t(candidate.ray) * target_.channels.count];
+    shadow_tracer_.trace(candidates_, [&](uint32_t i) {
+        const uint32_t ray = candidates_.ray[i];
         for (int k = 0; k < 3; ++k)
-            values[k] += candidate.contribution[k];
+            rays_.values[k][ray] += candidates_.contribution[k][i];
     });
     write(group);
 }
 
 void TileRenderer::generate(const PixelGroup &group) {
     const PixelRect &sampled = target_.blocks.sampled();
-    const size_t count = rays_.t.size();
     size_t ray = 0;
     for (const Pixel &pixel : group.pixels) {
-        const uint32_t number = pixel.row * sampled.width + pixel.column;
-        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray) {
-            const SampleStreams::Stream stream =
-                streams_.stream(number, group.first_sample + i);
-            rays_.stream_seed[ray] = stream.seed;
-            rays_.stream_index[ray] = stream.index;
-        }
+        streams_.streams(pixel.row * sampled.width + pixel.column, group.first_sample,
+                         group.sample_count, &rays_.stream_seed[ray],
+                         &rays_.stream_index[ray]);
+        ray += group.sample_count;
     }
     // Numbers for a light are drawn for rays that hit nothing too: a stream serves one ray.
-    draw_numbers(rays_.stream_seed.data(), rays_.stream_index.data(), count,
+    draw_numbers(rays_.stream_seed.data(), rays_.stream_index.data(), rays_.count,
                  {rays_.film_x.data(), rays_.film_y.data(), rays_.light_x.data(),
                   rays_.light_y.data()});
-    ray = 0;
+    float *film_x = rays_.film_x.data(), *film_y = rays_.film_y.data();
     for (const Pixel &pixel : group.pixels) {
         const float x = float(sampled.x + int(pixel.column));
         const float y = float(sampled.y + int(pixel.row));
-        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray) {
-            rays_.film_x[ray] += x;
-            rays_.film_y[ray] += y;
+        for (uint32_t i = 0; i < group.sample_count; ++i) {
+            film_x[i] += x;
+            film_y[i] += y;
         }
+        film_x += group.sample_count;
+        film_y += group.sample_count;
     }
-    for (ray = 0; ray < count; ++ray) {
-        const Vec3f d = scene_.plane.direction(rays_.film_x[ray], rays_.film_y[ray]);
+    const CameraMap &camera = scene_.plane.single;
+    for (size_t i = 0; i < rays_.t.size(); i += PACKET_WIDTH) {
+        const FloatPacket x = load<FloatPacket>(&rays_.film_x[i]);
+        const FloatPacket y = load<FloatPacket>(&rays_.film_y[i]);
+        const Vec3<FloatPacket> d =
+            (in_all_lanes(camera.base) + x * in_all_lanes(camera.dx)) +
+            y * in_all_lanes(camera.dy);
         for (int k = 0; k < 3; ++k)
-            rays_.direction[k][ray] = d[k];
+            store(&rays_.direction[k][i], d[k]);
     }
     std::fill(rays_.t_min.begin(), rays_.t_min.end(), scene_.plane.near_clip);
     std::fill(rays_.t_max.begin(), rays_.t_max.end(), scene_.plane.far_clip);
@@ -81,7 +115,7 @@ void TileRenderer::generate(const PixelGroup &group) {
 
 void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     RayGroup rays;
-    rays.count = uint32_t(rays_.t.size());
+    rays.count = uint32_t(rays_.count);
     rays.has_common_origin = true;
     rays.common_origin = scene_.plane.origin;
     for (int k = 0; k < 3; ++k)
@@ -105,81 +139,118 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
 }
 
 void TileRenderer::shade_hits() {
-    const FilmChannels &channels = target_.channels;
-    for (uint32_t ray = 0; ray < rays_.t.size(); ++ray) {
-        const uint32_t primitive = rays_.primitive[ray];
-        if (primitive == NO_PRIMITIVE)
+    HitPacket hit;
+    hit.origin = in_all_lanes(scene_.plane.origin);
+    for (size_t first = 0; first < rays_.count; first += PACKET_WIDTH) {
+        hit.lanes = 0;
+        uint32_t any_face = NO_PRIMITIVE;
+        for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+            hit.ray[lane] = uint32_t(first) + lane;
+            hit.faces[lane] = rays_.primitive[first + lane];
+            hit.lanes |= LaneBits(hit.faces[lane] != NO_PRIMITIVE) << lane;
+            any_face = std::min(any_face, hit.faces[lane]);
+        }
+        if (hit.lanes == 0)
             continue;
-        const Vec3f d = direction(ray);
-        const SurfacePoint point = hit_surface(scene_, scene_.plane.origin, d, primitive);
-        float *values = &rays_.values[size_t(ray) * channels.count];
-        // Mitsuba's distance: from the near plane, along the normalised direction.
-        if (channels.depth >= 0)
-            values[channels.depth] = (rays_.t[ray] - scene_.plane.near_clip) * length(d);
-        if (channels.normal >= 0)
-            for (int k = 0; k < 3; ++k)
-                values[channels.normal + k] = point.shading_normal[k];
-        shade(ray, point);
+        for_each_lane(ALL_LANES & ~hit.lanes,
+                      [&](uint32_t lane) { hit.faces[lane] = any_face; });
+        hit.direction = load_vectors(rays_.direction, first);
+        hit.light_x = load<FloatPacket>(&rays_.light_x[first]);
+        hit.light_y = load<FloatPacket>(&rays_.light_y[first]);
+        const SurfacePoint<FloatPacket> point =
+            hit_surface<FloatPacket>(scene_, hit.origin, hit.direction, hit.faces);
+        write_depth_and_normal(hit, point, first);
+        shade(hit, point);
     }
 }
 
+void TileRenderer::write_depth_and_normal(const HitPacket &hit,
+                                          const SurfacePoint<FloatPacket> &point,
+                                          size_t first) {
+    const FilmChannels &channels = target_.channels;
+    const auto hits = from_bits<FloatPacket>(hit.lanes);
+    const auto set = [&](int channel, const FloatPacket &value) {
+        store(&rays_.values[channel][first], select(hits, value, FloatPacket(0.0f)));
+    };
+    // Mitsuba's distance: from the near plane, along the normalised direction.
+    if (channels.depth >= 0)
+        set(channels.depth,
+            (load<FloatPacket>(&rays_.t[first]) - FloatPacket(scene_.plane.near_clip)) *
+                length(hit.direction));
+    for (int k = 0; k < 3 && channels.normal >= 0; ++k)
+        set(channels.normal + k, point.shading_normal[k]);
+}
+
 // Mitsuba's direct.cpp with one emitter sample and no BSDF sample: light that the surface
-// emits, and a candidate for light that it reflects.
-void TileRenderer::shade(uint32_t ray, const SurfacePoint &point) {
-    const SceneData &data = scene_.data;
-    const Shape &shape = data.shapes[point.shape];
-    const Vec3f d = direction(ray);
+// emits, and candidates for light that it reflects. A ray that contributes nothing, however
+// its shadow ray fares, is left out as soon as that is known.
+void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point) {
+    const FloatPacket zero(0.0f);
     // Only its sign matters, so the direction need not have unit length.
-    const float cos_view = -dot(d, point.shading_normal);
+    const FloatPacket cos_view = -dot(hit.direction, point.shading_normal);
+    const LaneBits seen_from_front = to_bits(cos_view > zero);
 
-    if (shape.emitter != NONE) {
-        if (data.hide_emitters) {
-            passing_.push_back({ray, offset_point(point.p, point.face_normal, d)});
+    LaneBits lanes = add_emission(hit, point, seen_from_front) & to_bits(cos_view != zero);
+    const Vec3<FloatPacket> albedo = albedo_of(scene_, hit.faces, seen_from_front);
+    lanes &= not_black(albedo);
+    if (lanes == 0 || scene_.data.emitters.empty())
+        return;
+    const EmitterSamples light =
+        sample_emitter(scene_, point.p, hit.light_x, hit.light_y, lanes);
+    const FloatPacket cosine = dot(light.direction, point.shading_normal);
+    const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
+    lanes &= not_black(light.weight) & to_bits(cos_light > zero);
+    if (lanes == 0)
+        return;
+    const Vec3<FloatPacket> start =
+        offset_point(point.p, point.face_normal, light.target - point.p);
+    const FloatPacket share = FloatPacket(std::numbers::inv_pi_v<float>) * cos_light;
+    candidates_.append(lanes, hit.ray, light.emitter, start, light.target,
+                       (albedo * share) * light.weight);
+}
+
+// Adds what surfaces emit towards the camera. Returns the lanes to be shaded; those that
+// met an emitter which is to be hidden go on behind it instead.
+LaneBits TileRenderer::add_emission(const HitPacket &hit,
+                                    const SurfacePoint<FloatPacket> &point,
+                                    LaneBits seen_from_front) {
+    const SceneData &data = scene_.data;
+    if (!scene_.any_shape_glows)
+        return hit.lanes;
+    LaneBits hidden = 0;
+    for_each_lane(hit.lanes, [&](uint32_t lane) {
+        const uint32_t number = data.shapes[scene_.shape_of_face[hit.faces[lane]]].emitter;
+        if (number == NONE)
             return;
-        }
-        float *values = &rays_.values[size_t(ray) * target_.channels.count];
-        for (int k = 0; k < 3 && cos_view > 0; ++k)
-            values[k] += data.emitters[shape.emitter].radiance[k];
+        if (data.hide_emitters)
+            hidden |= 1u << lane;
+        else if (seen_from_front >> lane & 1)
+            for (int k = 0; k < 3; ++k)
+                rays_.values[k][hit.ray[lane]] += data.emitters[number].radiance[k];
+    });
+    if (hidden != 0) {
+        const Vec3<FloatPacket> start =
+            offset_point(point.p, point.face_normal, hit.direction);
+        for_each_lane(hidden, [&](uint32_t lane) {
+            passing_.ray.push_back(hit.ray[lane]);
+            for (int k = 0; k < 3; ++k)
+                passing_.origin[k].push_back(start[k].entry(lane));
+        });
     }
-
-    if (shape.material == NONE || cos_view == 0)
-        return;
-    const Material &material = data.materials[shape.material];
-    const Vec3f albedo = cos_view > 0 ? material.front : material.back;
-    if (is_black(albedo))
-        return;
-    const EmitterSample light =
-        sample_emitter(scene_, point.p, rays_.light_x[ray], rays_.light_y[ray]);
-    if (is_black(light.weight))
-        return;
-    const float cosine = dot(light.direction, point.shading_normal);
-    const float cos_light = cos_view > 0 ? cosine : -cosine;
-    if (!(cos_light > 0))
-        return;
-
-    ShadowCandidate candidate;
-    candidate.ray = ray;
-    candidate.emitter = light.emitter;
-    candidate.origin = offset_point(point.p, point.face_normal, light.target - point.p);
-    candidate.target = light.target;
-    candidate.contribution =
-        (albedo * (std::numbers::inv_pi_v<float> * cos_light)) * light.weight;
-    candidates_.push_back(candidate);
+    return hit.lanes & ~hidden;
 }
 
 // Each round sends the rays that met a hidden emitter on from behind it. It ends: a ray
 // leaves the plane of a face for good, because the offset exceeds the rounding error of its
 // origin.
 void TileRenderer::pass_hidden_emitters() {
-    while (!passing_.empty()) {
-        const std::vector<PassingRay> passing = std::exchange(passing_, {});
-        const size_t count = passing.size();
-        std::vector<float> origin[3], d[3];
+    while (!passing_.ray.empty()) {
+        const PassingRays passing = std::exchange(passing_, {});
+        const size_t count = passing.ray.size();
+        std::vector<float> d[3];
         for (int k = 0; k < 3; ++k)
-            for (const PassingRay &ray : passing) {
-                origin[k].push_back(ray.origin[k]);
-                d[k].push_back(rays_.direction[k][ray.ray]);
-            }
+            for (const uint32_t ray : passing.ray)
+                d[k].push_back(rays_.direction[k][ray]);
         const std::vector<float> t_min(count, 0.0f);
         const std::vector<float> t_max(count, std::numeric_limits<float>::max());
         std::vector<float> t(count);
@@ -188,23 +259,53 @@ void TileRenderer::pass_hidden_emitters() {
         RayGroup group;
         group.count = uint32_t(count);
         for (int k = 0; k < 3; ++k) {
-            group.origin[k] = origin[k].data();
+            group.origin[k] = passing.origin[k].data();
             group.direction[k] = d[k].data();
         }
         group.t_min = t_min.data();
         group.t_max = t_max.data();
         trace_closest(*scene_.data.tree, group, options_,
                       HitGroup{t.data(), primitive.data()}, counters_.primary);
-        for (size_t i = 0; i < count; ++i)
-            if (primitive[i] != NO_PRIMITIVE)
-                shade(passing[i].ray, hit_surface(scene_, passing[i].origin,
-                                                  direction(passing[i].ray), primitive[i]));
+        for (size_t first = 0; first < count; first += PACKET_WIDTH)
+            shade_passed(passing, primitive, first);
     }
+}
+
+void TileRenderer::shade_passed(const PassingRays &passing,
+                                const std::vector<uint32_t> &primitive, size_t first) {
+    HitPacket hit;
+    hit.lanes = 0;
+    LaneArray<float> origin[3], d[3], light_x, light_y;
+    // Lanes behind the last ray repeat it; lanes that hit nothing take any face.
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const size_t i = std::min(first + lane, passing.ray.size() - 1);
+        const uint32_t ray = passing.ray[i];
+        const bool hits = primitive[i] != NO_PRIMITIVE;
+        hit.lanes |= LaneBits(hits && i == first + lane) << lane;
+        hit.ray[lane] = ray;
+        hit.faces[lane] = hits ? primitive[i] : 0;
+        for (int k = 0; k < 3; ++k) {
+            origin[k][lane] = passing.origin[k][i];
+            d[k][lane] = rays_.direction[k][ray];
+        }
+        light_x[lane] = rays_.light_x[ray];
+        light_y[lane] = rays_.light_y[ray];
+    }
+    if (hit.lanes == 0)
+        return;
+    for (int k = 0; k < 3; ++k) {
+        hit.origin[k] = load<FloatPacket>(origin[k]);
+        hit.direction[k] = load<FloatPacket>(d[k]);
+    }
+    hit.light_x = load<FloatPacket>(light_x);
+    hit.light_y = load<FloatPacket>(light_y);
+    shade(hit, hit_surface<FloatPacket>(scene_, hit.origin, hit.direction, hit.faces));
 }
 
 void TileRenderer::write(const PixelGroup &group) {
     const Film &film = scene_.data.film;
     const PixelRect &sampled = target_.blocks.sampled();
+    std::vector<const float *> values(target_.channels.count);
     size_t ray = 0;
     for (const Pixel &pixel : group.pixels) {
         const uint32_t column = pixel.column + uint32_t(sampled.x) - film.crop_x;
@@ -213,10 +314,11 @@ void TileRenderer::write(const PixelGroup &group) {
             row < film.crop_height)
             target_.primitive[size_t(row) * film.crop_width + column] =
                 int32_t(rays_.primitive[ray]);
-        for (uint32_t i = 0; i < group.sample_count; ++i, ++ray)
-            target_.blocks.add(pixel.column, pixel.row, rays_.film_x[ray],
-                               rays_.film_y[ray],
-                               &rays_.values[ray * target_.channels.count]);
+        for (uint32_t k = 0; k < target_.channels.count; ++k)
+            values[k] = &rays_.values[k][ray];
+        target_.blocks.add(pixel.column, pixel.row, group.sample_count, &rays_.film_x[ray],
+                           &rays_.film_y[ray], values.data());
+        ray += group.sample_count;
     }
 }
 

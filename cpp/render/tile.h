@@ -76,34 +76,47 @@ public:
     const RenderCounters &counters() const { return counters_; }
 
 private:
-    // Arrays of one entry a ray, in the order of pixels and, within each, of samples.
+    // Arrays of one entry a ray, in the order of pixels and, within each, of samples, and
+    // of whole packets: what lies behind the last ray hits nothing.
     struct Rays {
+        size_t count = 0;
         std::vector<uint32_t> stream_seed, stream_index;
         std::vector<float> film_x, film_y, light_x, light_y;
         std::vector<float> direction[3], t_min, t_max;
         std::vector<float> t;
         std::vector<uint32_t> primitive;
-        std::vector<float> values; // FilmChannels::count a ray
+        std::vector<std::vector<float>> values; // by channel of the film
 
-        void resize(size_t count, size_t channels);
+        void resize(size_t new_count, size_t channels);
     };
 
-    // A camera ray that goes on behind an emitter that is to be hidden.
-    struct PassingRay {
-        uint32_t ray;
-        Vec3f origin;
+    // Up to sixteen rays that meet a surface.
+    struct HitPacket {
+        LaneBits lanes = 0;
+        LaneArray<uint32_t> ray;
+        Vec3<FloatPacket> origin, direction;
+        FaceNumbers faces;
+        FloatPacket light_x, light_y;
+    };
+
+    // Camera rays that go on behind an emitter that is to be hidden.
+    struct PassingRays {
+        std::vector<uint32_t> ray;
+        std::vector<float> origin[3];
     };
 
     void generate(const PixelGroup &group);
     void trace_camera_rays(const PixelGroup &group);
     void shade_hits();
-    void shade(uint32_t ray, const SurfacePoint &point);
+    void write_depth_and_normal(const HitPacket &hit,
+                                const SurfacePoint<FloatPacket> &point, size_t first);
+    void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
+    LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                          LaneBits seen_from_front);
     void pass_hidden_emitters();
+    void shade_passed(const PassingRays &passing, const std::vector<uint32_t> &primitive,
+                      size_t first);
     void write(const PixelGroup &group);
-
-    Vec3f direction(uint32_t ray) const {
-        return {rays_.direction[0][ray], rays_.direction[1][ray], rays_.direction[2][ray]};
-    }
 
     const PreparedScene &scene_;
     const SampleStreams &streams_;
@@ -112,8 +125,8 @@ private:
     RenderCounters counters_;
     ShadowTracer shadow_tracer_;
     Rays rays_;
-    std::vector<ShadowCandidate> candidates_;
-    std::vector<PassingRay> passing_;
+    ShadowCandidates candidates_;
+    PassingRays passing_;
 };
 
 } // namespace mlrt
