@@ -108,6 +108,58 @@ nb::dict hit_surface_of(const SceneHandle &handle, const Floats3 &origin,
     return result;
 }
 
+using Vectors = std::vector<Floats3>;
+
+Vec3<FloatPacket> packet_of(const Vectors &vectors) {
+    LaneArray<float> lanes[3];
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        for (int k = 0; k < 3; ++k)
+            lanes[k][lane] = vectors.at(lane)[k];
+    return {load<FloatPacket>(lanes[0]), load<FloatPacket>(lanes[1]),
+            load<FloatPacket>(lanes[2])};
+}
+
+Vectors vectors_of(const Vec3<FloatPacket> &packet) {
+    Vectors vectors(PACKET_WIDTH);
+    for (int k = 0; k < 3; ++k) {
+        const LaneArray<float> lanes = to_lanes<float>(packet[k]);
+        for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+            vectors[lane][k] = lanes[lane];
+    }
+    return vectors;
+}
+
+nb::dict hit_packet(const SceneHandle &handle, const Vectors &origins,
+                    const Vectors &directions, const std::vector<uint32_t> &primitives) {
+    FaceNumbers faces;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        faces[lane] = primitives.at(lane);
+    const Vec3<FloatPacket> o = packet_of(origins), d = packet_of(directions);
+    const Vec2<FloatPacket> at = barycentrics_of(o, d, corners_of(*handle.scene, faces));
+    const SurfacePoint<FloatPacket> point =
+        hit_surface<FloatPacket>(*handle.scene, o, d, faces);
+    nb::dict result;
+    result["weights"] = vectors_of({at.x, at.y, FloatPacket(0.0f)});
+    result["p"] = vectors_of(point.p);
+    result["face_normal"] = vectors_of(point.face_normal);
+    result["shading_normal"] = vectors_of(point.shading_normal);
+    return result;
+}
+
+nb::dict emitter_packet(const SceneHandle &handle, const Vectors &points,
+                        const Vectors &numbers) {
+    const Vec3<FloatPacket> random = packet_of(numbers);
+    const EmitterSamples samples =
+        sample_emitter(*handle.scene, packet_of(points), random.x, random.y, ALL_LANES);
+    nb::dict result;
+    result["weight"] = vectors_of(samples.weight);
+    result["direction"] = vectors_of(samples.direction);
+    result["target"] = vectors_of(samples.target);
+    result["emitter"] =
+        std::vector<uint32_t>(samples.emitter.begin(), samples.emitter.end());
+    return result;
+}
+
 Floats3 offset_point_of(const Floats3 &p, const Floats3 &normal, const Floats3 &towards) {
     return array(offset_point(vector(p), vector(normal), vector(towards)));
 }
@@ -127,6 +179,12 @@ void bind_render_selftest(nb::module_ &m) {
           nb::arg("y"));
     s.def("hit_surface", &hit_surface_of, nb::arg("scene"), nb::arg("origin"),
           nb::arg("direction"), nb::arg("primitive"));
+    s.def("hit_packet", &hit_packet, nb::arg("scene"), nb::arg("origins"),
+          nb::arg("directions"), nb::arg("primitives"),
+          "hit_surface of sixteen rays, and the weights of the vertices b and c.");
+    s.def("emitter_packet", &emitter_packet, nb::arg("scene"), nb::arg("points"),
+          nb::arg("numbers"),
+          "sample_emitter of sixteen points; numbers are x, y, unused.");
     s.def("offset_point", &offset_point_of, nb::arg("p"), nb::arg("normal"),
           nb::arg("towards"));
     s.attr("SHADOW_EPSILON") = SHADOW_EPSILON;
