@@ -1,5 +1,8 @@
 #include "mlrta/beam.h"
 
+#include "base/simd.h"
+#include "traverse/load_packet.h"
+
 #include <bit>
 #include <cmath>
 
@@ -38,6 +41,111 @@ void planes_from_slopes(Beam &beam) {
         beam.has_planes = beam.has_common_origin();
         return;
     }
+}
+
+// Least and greatest of what is added, lane by lane: the second operand of minimum() and
+// maximum() stays where the first is not a number.
+struct PacketRange {
+    FloatPacket lo = INFINITY, hi = -INFINITY;
+
+    void add(const FloatPacket &x) {
+        lo = minimum(x, lo);
+        hi = maximum(x, hi);
+    }
+    Range of_all_lanes() const { return {least_lane(lo), greatest_lane(hi)}; }
+};
+
+// Two roundings to single precision and those of what follows, and quotients that
+// underflow.
+constexpr double WIDEN_QUOTIENT = 0x1p-22, SMALLEST_QUOTIENT = 0x1p-120;
+
+// Bounds of what the active rays of a group have, sixteen rays at a time.
+class RayBounds {
+public:
+    explicit RayBounds(bool has_common_origin) : has_common_origin_(has_common_origin) {}
+
+    // Adds up to a packet of rays.
+    void add(const RayGroup &rays, uint32_t first, uint32_t count) {
+        const FloatPacket t_max = load_padded(rays.t_max, first, first + count);
+        auto active = load_padded(rays.t_min, first, first + count) < t_max;
+        Vec3<FloatPacket> d;
+        for (int k = 0; k < 3; ++k) {
+            d[k] = load_padded(rays.direction[k], first, first + count);
+            active &= absolute(d[k]) < FloatPacket(INFINITY);
+        }
+        // Not a number: left out by minimum() and maximum().
+        const FloatPacket none(std::numeric_limits<float>::quiet_NaN());
+        const FloatPacket one(1.0f);
+        for (int k = 0; k < 3; ++k)
+            d[k] = select(active, d[k], none);
+        const Vec3<FloatPacket> r{one / d.x, one / d.y, one / d.z};
+        for (int k = 0; k < 3; ++k) {
+            extent_[k].add(d[k]);
+            for (int step = 1; step < 3; ++step) {
+                const int j = (k + step) % 3;
+                slope_[k][j].add(d[j] * r[k]);
+            }
+            if (!has_common_origin_)
+                origin_[k].add(select(
+                    active, load_padded(rays.origin[k], first, first + count), none));
+        }
+        t_max_.add(select(active, t_max, none));
+    }
+
+    double greatest_t_max() const { return t_max_.of_all_lanes().hi; }
+    std::array<Range, 3> extent() const { return of_all_lanes(extent_); }
+    std::array<Range, 3> origin() const { return of_all_lanes(origin_); }
+
+    // Whether no quotient of directions overflows or loses precision where it matters.
+    bool slopes_are_safe(const std::array<Range, 3> &extent) const {
+        constexpr double LEAST = 0x1p-60, GREATEST = 0x1p60;
+        for (const Range &e : extent)
+            if (e.magnitude() > GREATEST ||
+                (heading_of(e) != Heading::mixed &&
+                 std::min(std::abs(e.lo), std::abs(e.hi)) < LEAST))
+                return false;
+        return true;
+    }
+
+    std::array<std::array<Range, 3>, 3> slope() const {
+        std::array<std::array<Range, 3>, 3> slope;
+        for (int k = 0; k < 3; ++k)
+            for (int step = 1; step < 3; ++step) {
+                const int j = (k + step) % 3;
+                const Range rough = slope_[k][j].of_all_lanes().widened(WIDEN_QUOTIENT);
+                slope[k][j] = {rough.lo - SMALLEST_QUOTIENT, rough.hi + SMALLEST_QUOTIENT};
+            }
+        return slope;
+    }
+
+private:
+    static std::array<Range, 3> of_all_lanes(const std::array<PacketRange, 3> &ranges) {
+        return {ranges[0].of_all_lanes(), ranges[1].of_all_lanes(),
+                ranges[2].of_all_lanes()};
+    }
+
+    bool has_common_origin_;
+    std::array<PacketRange, 3> extent_, origin_;
+    std::array<std::array<PacketRange, 3>, 3> slope_;
+    PacketRange t_max_;
+};
+
+// The same slopes in double precision, for directions of any size.
+std::array<std::array<Range, 3>, 3> exact_slopes(const RayGroup &rays, uint32_t first,
+                                                 uint32_t count) {
+    std::array<std::array<Range, 3>, 3> slope;
+    for (uint32_t i = first; i < first + count; ++i) {
+        const Vec3d d{rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+        if (!(rays.t_min[i] < rays.t_max[i]) || !is_finite(d))
+            continue;
+        // Along an axis with a zero component these are infinite or NaN, and not used.
+        for (int k = 0; k < 3; ++k)
+            for (int step = 1; step < 3; ++step) {
+                const int j = (k + step) % 3;
+                slope[k][j].add(d[j] / d[k]);
+            }
+    }
+    return slope;
 }
 
 } // namespace
@@ -128,31 +236,17 @@ bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_
 }
 
 Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count) {
+    RayBounds bounds(rays.has_common_origin);
+    for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
+        bounds.add(rays, i, std::min(first + count - i, PACKET_WIDTH));
+
     Beam beam;
-    beam.t_max = -std::numeric_limits<double>::infinity();
-    std::array<Range, 3> extent;
-    std::array<std::array<Range, 3>, 3> slope;
-    for (uint32_t i = first; i < first + count; ++i) {
-        if (!(rays.t_min[i] < rays.t_max[i]))
-            continue;
-        const Vec3d d{rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-        if (!is_finite(d))
-            continue;
-        for (int k = 0; k < 3; ++k)
-            extent[k].add(d[k]);
-        // Along an axis with a zero component these are infinite or NaN, and not used.
-        const double rx = 1.0 / d.x, ry = 1.0 / d.y, rz = 1.0 / d.z;
-        slope[0][1].add(d.y * rx);
-        slope[0][2].add(d.z * rx);
-        slope[1][0].add(d.x * ry);
-        slope[1][2].add(d.z * ry);
-        slope[2][0].add(d.x * rz);
-        slope[2][1].add(d.y * rz);
-        beam.t_max = std::max(beam.t_max, double(rays.t_max[i]));
-        if (!rays.has_common_origin)
-            for (int k = 0; k < 3; ++k)
-                beam.origin[k].add(rays.origin[k][i]);
-    }
+    beam.t_max = bounds.greatest_t_max();
+    const std::array<Range, 3> extent = bounds.extent();
+    const std::array<std::array<Range, 3>, 3> slope =
+        bounds.slopes_are_safe(extent) ? bounds.slope() : exact_slopes(rays, first, count);
+    if (!rays.has_common_origin)
+        beam.origin = bounds.origin();
     for (int k = 0; k < 3; ++k) {
         if (rays.has_common_origin)
             beam.origin[k] = {rays.common_origin[k], rays.common_origin[k]};
