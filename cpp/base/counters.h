@@ -13,9 +13,10 @@ struct Counters {
     uint64_t leaf_visits = 0;     // of which leaves
     uint64_t triangle_tests = 0;  // packet against triangle
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
-    uint64_t exact_tests = 0;  // ... and that double precision left undecided
-    uint64_t tiles = 0;        // tiles for which an entry point was searched
-    uint64_t missed_tiles = 0; // tiles that no leaf can hold a hit for
+    uint64_t exact_distances = 0; // distances that double precision could not round
+    uint64_t exact_tests = 0;     // ... and that double precision left undecided
+    uint64_t tiles = 0;           // tiles for which an entry point was searched
+    uint64_t missed_tiles = 0;    // tiles that no leaf can hold a hit for
 
     Counters &operator+=(const Counters &other) {
         rays += other.rays;
@@ -26,6 +27,7 @@ struct Counters {
         triangle_tests += other.triangle_tests;
         double_tests += other.double_tests;
         exact_tests += other.exact_tests;
+        exact_distances += other.exact_distances;
         tiles += other.tiles;
         missed_tiles += other.missed_tiles;
         return *this;

@@ -9,6 +9,7 @@
 
 #include "base/check.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -39,6 +40,14 @@ public:
     static constexpr int CAPACITY = 384;
 
     Expansion() = default;
+    Expansion(const Expansion &other) : count_(other.count_) {
+        std::copy_n(other.terms_.begin(), count_, terms_.begin());
+    }
+    Expansion &operator=(const Expansion &other) {
+        count_ = other.count_;
+        std::copy_n(other.terms_.begin(), count_, terms_.begin());
+        return *this;
+    }
     explicit Expansion(double value) { append(value); }
 
     // a - b, which need not be a double.

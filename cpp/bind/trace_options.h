@@ -58,6 +58,7 @@ inline nanobind::dict counters_to_dict(const Counters &counters,
     add("triangle_tests", counters.triangle_tests);
     add("double_tests", counters.double_tests);
     add("exact_tests", counters.exact_tests);
+    add("exact_distances", counters.exact_distances);
     add("tiles", counters.tiles);
     add("missed_tiles", counters.missed_tiles);
     return dict;

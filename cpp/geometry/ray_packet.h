@@ -42,9 +42,10 @@ struct RayPacket {
 // Lanes whose ray hits a triangle anywhere on its line, and where.
 struct PacketCandidates {
     LaneBits hit = 0;
-    FloatPacket t;             // of the lanes that hit
-    uint32_t double_tests = 0; // lanes that single precision left undecided
-    uint32_t exact_tests = 0;  // ... and that double precision left undecided
+    FloatPacket t;                // of the lanes that hit
+    uint32_t double_tests = 0;    // lanes that single precision left undecided
+    uint32_t exact_tests = 0;     // ... and that double precision left undecided
+    uint32_t exact_distances = 0; // lanes whose distance double precision could not round
 };
 
 inline constexpr float FLOAT_ROUNDOFF = 0x1p-24f;
@@ -68,10 +69,12 @@ struct FilteredVolumes {
         // triangle_test.cpp.
         const auto edge = [&](const Vec3d &p, const Vec3d &q, FloatPacket &volume) {
             const Vec3d normal = cross(p, q);
+            if (!(max_component(abs(normal)) < LARGEST_NORMAL))
+                return double(INFINITY);
             const Vec3f n(normal);
-            volume = drjit::fmadd(
-                rays.direction.x, FloatPacket(n.x),
-                drjit::fmadd(rays.direction.y, FloatPacket(n.y), rays.direction.z * n.z));
+            volume = fused(rays.direction.x, FloatPacket(n.x),
+                           fused(rays.direction.y, FloatPacket(n.y),
+                                 FloatPacket(rays.direction.z * n.z)));
             return 5.0 * double(FLOAT_ROUNDOFF) * dot(abs(normal), max_direction) +
                    10 * DOUBLE_ROUNDOFF * dot(cross_magnitude(p, q), max_direction) +
                    double(UNDERFLOW) *
@@ -79,7 +82,7 @@ struct FilteredVolumes {
         };
         const double bound =
             std::max({edge(b, c, u), edge(c, a, v), edge(a, b, w), double(SMALLEST_BOUND)});
-        error = FloatPacket(float(bound * 1.000001));
+        error = FloatPacket(bound < LARGEST_BOUND ? float(bound * 1.000001) : INFINITY);
     }
 
     // Differences, products, subtraction, product and sums: seven roundings in a row, each
@@ -104,6 +107,8 @@ struct FilteredVolumes {
                                           absolute(rays.direction.z);
         error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) +
                 UNDERFLOW * direction_sum + SMALLEST_BOUND;
+        error = select(MaskOf<FloatPacket>((size < LARGEST_SIZE) & (error < LARGEST_BOUND)),
+                       error, FloatPacket(INFINITY));
     }
 
     // Lanes that certainly hit, and lanes that neither certainly hit nor certainly miss.
@@ -120,6 +125,12 @@ private:
     // and as much in each product with the direction.
     static constexpr float UNDERFLOW = 0x1p-147f;
     static constexpr float SMALLEST_BOUND = 0x1p-120f;
+    // What exceeds these might overflow on the way to a volume, and leaves it undecided:
+    // terms of a volume are less than a bound / u, those of an edge normal than a size
+    // squared.
+    static constexpr float LARGEST_BOUND = 0x1p100f;
+    static constexpr double LARGEST_NORMAL = 0x1p120;
+    static constexpr float LARGEST_SIZE = 0x1p60f;
 
     FloatPacket least() const { return minimum(u, minimum(v, w)); }
     FloatPacket greatest() const { return maximum(u, maximum(v, w)); }
@@ -168,6 +179,7 @@ PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
     result.t = distance.template rounded<FloatPacket>();
     const LaneBits certain = to_bits(distance.template certain<FloatPacket>());
     for_each_lane(result.hit & ~certain, [&](uint32_t lane) {
+        ++result.exact_distances;
         result.t.entry(lane) =
             exact_distance(rays.origin.of_lane(lane), rays.lane_direction(lane), triangle);
     });

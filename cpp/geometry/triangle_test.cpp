@@ -53,6 +53,21 @@ bool same_side(int u, int v, int w) {
     return (least >= 0 && greatest > 0) || (greatest <= 0 && least < 0);
 }
 
+// The float nearest to numerator / denominator, ties to even.
+float rounded_quotient(double numerator, double denominator) {
+    const double quotient = numerator / denominator;
+    const double step = std::abs(quotient) * 0x1p-52;
+    const float below = float(quotient - step), above = float(quotient + step);
+    // Rounding to double is monotone, so it only loses the side of a midpoint of floats if
+    // it ends on that midpoint; then the remainder, which is exact, tells the side.
+    const bool at_midpoint =
+        below != above && quotient == 0.5 * (double(below) + double(above));
+    const double remainder = std::fma(-quotient, denominator, numerator);
+    if (!at_midpoint || remainder == 0)
+        return float(quotient);
+    return (remainder < 0) == (denominator < 0) ? above : below;
+}
+
 } // namespace
 
 HitDecision decide_hit(Vec3f origin, Vec3f direction, const Triangle &triangle) {
@@ -78,6 +93,15 @@ HitDecision decide_hit(Vec3f origin, Vec3f direction, const Triangle &triangle) 
 }
 
 float exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+    // A camera that looks straight at a wall sees all of it at one depth, which may be a
+    // midpoint of floats for every ray: worth a shorter way.
+    for (int k = 0; k < 3; ++k) {
+        if (triangle.a[k] != triangle.b[k] || triangle.a[k] != triangle.c[k])
+            continue;
+        const SumAndError distance = two_sum(triangle.a[k], -double(origin[k]));
+        if (distance.error == 0)
+            return rounded_quotient(distance.sum, direction[k]);
+    }
     const ExactVec3 normal = exact_cross(exact_difference(triangle.b, triangle.a),
                                          exact_difference(triangle.c, triangle.a));
     const Expansion numerator = exact_dot(normal, exact_difference(triangle.a, origin));

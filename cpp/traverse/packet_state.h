@@ -35,6 +35,7 @@ struct PacketState {
         const PacketCandidates candidates = intersect(rays, lanes, triangle);
         counters.double_tests += candidates.double_tests;
         counters.exact_tests += candidates.exact_tests;
+        counters.exact_distances += candidates.exact_distances;
         if (candidates.hit == 0)
             return;
         // Infinity stands for a miss.

@@ -139,3 +139,44 @@ def test_needles_and_caps_far_from_the_ray_are_missed(core: ModuleType) -> None:
     expected = oracles.nearest_hits(crossings)
     assert any(expected)
     assert_exact(closest(build(core, scene), rays, BRUTE_FORCE), expected)
+
+
+# Planes across an axis have a way of their own to the rounded distance.
+@each_core
+def test_distances_to_planes_across_an_axis_are_exact(core: ModuleType) -> None:
+    rng = np.random.default_rng(SEED)
+    for axis in range(3):
+        height = rng.uniform(500, 600, 40).astype(np.float32)
+        corners = rng.uniform(-50, 50, (40, 3, 3)).astype(np.float32)
+        corners[:, :, axis] = height[:, None]
+        scene = corners.reshape(-1, 3), np.arange(120, dtype=np.uint32).reshape(-1, 3)
+        inside = corners.mean(axis=1)
+        origins = rng.uniform(-1, 1, (40, 3)).astype(np.float32)
+        origins[:, axis] = -800  # differences of 1300 to 1400 fall on midpoints of floats
+        directions = (inside - origins).astype(np.float32)
+        unit = directions / np.abs(directions[:, [axis]])
+        for along in (directions, unit.astype(np.float32), -unit.astype(np.float32)):
+            rays = origins, np.ascontiguousarray(along)
+            crossings = list(oracles.Soup(*scene).crossings(*rays))
+            expected = oracles.nearest_hits(crossings)
+            assert_exact(closest(build(core, scene), rays, BRUTE_FORCE), expected)
+
+
+# Coordinates whose products leave the range of single precision.
+@each_core
+@pytest.mark.parametrize("common_origin", [False, True])
+@pytest.mark.parametrize("power", [40, 55, 62, 64, 70, 90, 110])
+def test_huge_coordinates(core: ModuleType, power: int, common_origin: bool) -> None:
+    rng = np.random.default_rng(SEED)
+    scale = np.float32(2.0**power)
+    vertices, faces = workloads.soup(rng, 12, 1.0)
+    scene = vertices * scale, faces
+    origins = rng.uniform(-1, 2, (200, 3)).astype(np.float32) * scale
+    if common_origin:
+        origins[:] = origins[0]
+    targets = scene[0][rng.integers(0, len(vertices), 200)]
+    directions = ((targets - origins) / scale).astype(np.float32)
+    rays = origins, directions
+    expected = oracles.nearest_hits(list(oracles.Soup(*scene).crossings(*rays)))
+    assert any(expected)
+    assert_exact(closest(build(core, scene), rays, BRUTE_FORCE), expected)
