@@ -42,9 +42,7 @@ ENTRY_POINTS: dict[str, Options] = {
     "no leaf rejection": _entry_points(leaf_rejection="none"),
     "leaf rejection by parameters": _entry_points(leaf_rejection="parameters"),
     "frustum planes": _entry_points(culling="frustum_planes"),
-    "frustum planes, no leaf rejection": _entry_points(
-        culling="frustum_planes", leaf_rejection="none"
-    ),
+    "no culling": _entry_points(culling="none"),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
 }

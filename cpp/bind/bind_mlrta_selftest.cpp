@@ -5,6 +5,7 @@
 #include "bind/tree_handle.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/beam_judge.h"
+#include "mlrta/tile.h"
 
 #include <map>
 #include <nanobind/ndarray.h>
@@ -232,6 +233,16 @@ void bind_mlrta_selftest(nb::module_ &m) {
           "Entry node (or None) and the nodes visited, in order, for a tree and decisions "
           "given "
           "as tables; the lower child is the near one.");
+    s.def(
+        "split_tile",
+        [](uint32_t first, uint32_t count, uint32_t split_factor) {
+            std::vector<std::pair<uint32_t, uint32_t>> children;
+            for_each_child(Tile{first, count}, split_factor, [&](Tile child) {
+                children.emplace_back(child.first, child.count);
+            });
+            return children;
+        },
+        "(first, count) of the parts of a tile, in order.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
     s.def("nodes_of", &nodes_of);

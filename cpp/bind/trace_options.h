@@ -29,7 +29,8 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                       {"slopes", LeafRejection::slopes}},
                                      options.leaf_rejection);
     options.culling = fields.choice<Culling>("culling",
-                                             {{"inverse_frustum", Culling::inverse_frustum},
+                                             {{"none", Culling::none},
+                                              {"inverse_frustum", Culling::inverse_frustum},
                                               {"frustum_planes", Culling::frustum_planes}},
                                              options.culling);
     fields.finish();

@@ -19,19 +19,22 @@ public:
     Sides sides(uint32_t, KdNode node, const Box3f &cell) const {
         const AxisPlane plane{node.axis(), node.split()};
         const bool upper_is_near = mlrt::upper_is_near(beam_, plane);
-        if (options_.culling == Culling::frustum_planes) {
+        switch (options_.culling) {
+        case Culling::none:
+            break;
+        case Culling::frustum_planes: {
             Box3f lower = cell, upper = cell;
             lower.hi[plane.axis] = node.split();
             upper.lo[plane.axis] = node.split();
             return {may_enter_by_planes(beam_, lower), may_enter_by_planes(beam_, upper),
                     upper_is_near};
         }
-        switch (cull_children(beam_, cell, plane)) {
-        case Cull::near_only:
-            return {!upper_is_near, upper_is_near};
-        case Cull::far_only:
-            return {upper_is_near, !upper_is_near};
-        case Cull::both:
+        case Culling::inverse_frustum:
+            const Cull cull = cull_children(beam_, cell, plane);
+            if (cull == Cull::near_only)
+                return {!upper_is_near, upper_is_near};
+            if (cull == Cull::far_only)
+                return {upper_is_near, !upper_is_near};
             break;
         }
         return {true, true, upper_is_near};

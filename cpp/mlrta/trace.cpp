@@ -1,6 +1,8 @@
 #include "mlrta/trace.h"
 
 #include "mlrta/beam_judge.h"
+#include "mlrta/tile.h"
+#include "traverse/brute_force.h"
 #include "traverse/interval.h"
 #include "traverse/load_packet.h"
 #include "traverse/packet.h"
@@ -96,15 +98,8 @@ private:
             trace_packets(first, count, *entry);
             return;
         }
-        const uint32_t share = child_count(count);
-        for (uint32_t offset = 0; offset < count; offset += share)
-            trace_tile(first + offset, std::min(share, count - offset), *entry);
-    }
-
-    // Rays of a child tile, in whole packets.
-    uint32_t child_count(uint32_t count) const {
-        const uint32_t share = (count + options_.split_factor - 1) / options_.split_factor;
-        return (share + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
+        for_each_child(Tile{first, count}, options_.split_factor,
+                       [&](Tile child) { trace_tile(child.first, child.count, *entry); });
     }
 
     double greatest_t_max(uint32_t first, uint32_t count) const {
@@ -136,10 +131,7 @@ private:
         PacketState<Output::query> state(packet);
         switch (options_.traversal) {
         case Traversal::brute_force:
-            for (uint32_t primitive = 0; primitive < tree_.triangles.size(); ++primitive)
-                if (is_finite(tree_.triangles[primitive]))
-                    state.test(packet, state.searching, tree_.triangles[primitive],
-                               primitive, counters_);
+            trace_brute_force(tree_, packet, state, counters_);
             break;
         case Traversal::interval:
             if constexpr (std::is_same_v<Origin, CommonOrigin>)

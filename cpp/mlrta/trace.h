@@ -20,15 +20,19 @@ enum class Traversal : uint32_t {
                  // section 3.3)
 };
 
+// Step 2 of inverse frustum culling, at leaves [C2].
 enum class LeafRejection : uint32_t {
     none,
-    parameters,
-    slopes
-}; // step 2: off, mode P, mode S
+    parameters, // mode P
+    slopes,     // mode S
+};
+
+// Which children a beam may enter.
 enum class Culling : uint32_t {
-    inverse_frustum,
-    frustum_planes
-}; // C1 + C2, or C3 as control
+    none,            // both, always
+    inverse_frustum, // step 1 at inner nodes [C1]
+    frustum_planes,  // the classic test as control [C3], at leaves too: no leaf rejection
+};
 
 struct TraceOptions {
     Traversal traversal = Traversal::packet;
