@@ -1,5 +1,6 @@
 #include "mlrta/beam.h"
 
+#include "base/check.h"
 #include "base/simd.h"
 #include "traverse/load_packet.h"
 
@@ -217,6 +218,7 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
 
 bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_max,
                Beam &beam) {
+    MLRT_CHECK(uint64_t(first) + count <= uint64_t(tile.size) * tile.size * tile.samples);
     if (first % tile.samples != 0 || count % tile.samples != 0)
         return false;
     const uint32_t pixel = first / tile.samples, pixels = count / tile.samples;
