@@ -32,6 +32,11 @@ def halve(corners: Polygon, axis: int, position: Fraction, side: int) -> Polygon
 
     Sutherland and Hodgman 1974, without rounding: corners in the plane belong to the part.
     """
+    inside = [side * corner[axis] >= side * position for corner in corners]
+    if all(inside):
+        return corners
+    if not any(inside):
+        return []
     kept: Polygon = []
     for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
         da, db = side * (a[axis] - position), side * (b[axis] - position)
@@ -54,6 +59,25 @@ def bounds(corners: Polygon) -> tuple[Point, Point]:
     """Returns the least and the greatest coordinates of a polygon that is not empty."""
     columns = list(zip(*corners, strict=True))
     return tuple(min(c) for c in columns), tuple(max(c) for c in columns)
+
+
+def overlaps(corners: Polygon, lo: Sequence[Fraction], hi: Sequence[Fraction]) -> bool:
+    """Whether a convex polygon meets the interior of a box.
+
+    Along an axis where the box has no extent, meeting it is enough: its interior is then
+    that of the rectangle, the segment or the point that it is.
+
+    Of the closed part of the polygon in the box, the mean of the corners lies off every
+    face that not all corners lie in. If all do, no point of it is in the interior.
+    """
+    part = clip(corners, lo, hi)
+    if not part:
+        return False
+    least, greatest = bounds(part)
+    return all(
+        low == high or (first < high and last > low)
+        for low, high, first, last in zip(lo, hi, least, greatest, strict=True)
+    )
 
 
 def _cross_section(corners: Polygon, x: Fraction) -> tuple[Fraction, Fraction] | None:

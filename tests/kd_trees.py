@@ -8,11 +8,17 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from mlrt_plugin._dispatch import core
 
 FloatArray = npt.NDArray[np.float32]
 LEAF = 3
+
+BUILDERS: dict[str, dict[str, Any]] = {"exact": {}}
+"""Build options by the name of the builder that they choose."""
+
+each_builder = pytest.mark.parametrize("builder", BUILDERS)
 
 
 @dataclass(frozen=True)
@@ -51,6 +57,10 @@ class BuiltTree:
     def referenced(self, leaf: int) -> list[int]:
         first = int(self.first_reference[leaf])
         return [int(r) for r in self.references[first : first + int(self.count[leaf])]]
+
+    def leaves(self) -> Iterator[Visit]:
+        """Yields all leaves."""
+        return (visit for visit in self.walk() if self.is_leaf(visit.node))
 
     def walk(self) -> Iterator[Visit]:
         """Yields all nodes, parents first, the lower child before the upper one."""
