@@ -6,7 +6,14 @@ Importing the package makes the plugin ``<integrator type="mlrt">`` known to Mit
 from __future__ import annotations
 
 from . import _dispatch, integrator
-from .errors import MlrtError, MlrtWarning, OutputError, SceneError, UnsupportedFeature
+from .errors import (
+    MlrtError,
+    MlrtWarning,
+    OutputError,
+    SceneError,
+    TreeFileError,
+    UnsupportedFeature,
+)
 from .render import PreparedScene, RenderResult, prepare, render
 from .scene_arrays import SceneArrays
 from .scene_import import import_scene
@@ -23,6 +30,7 @@ __all__ = [
     "RenderResult",
     "SceneArrays",
     "SceneError",
+    "TreeFileError",
     "UnsupportedFeature",
     "__version__",
     "import_scene",

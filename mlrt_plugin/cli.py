@@ -1,4 +1,4 @@
-"""The command ``mlrt``: renders a scene, or tells what it uses.
+"""The command ``mlrt``: renders a scene, or tells of its tree or what it uses.
 
 Exit codes: 0 done, 1 the scene or the output is at fault, 2 the command line is, 130
 interrupted. With ``MLRT_DEBUG`` set in the environment, errors come with a traceback.
@@ -24,6 +24,7 @@ from .options import AOVS
 from .progress import ProgressBar
 from .render import checked_seed, checked_spp, prepare
 from .threads import thread_count
+from .tree_command import add_build_options, add_tree_cache, run_tree
 
 EXIT_ERROR, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -100,6 +101,14 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="NAMES",
         help=f"further channels, separated by commas: {', '.join(AOVS)}",
     )
+    add_tree_cache(render)
+    tree = commands.add_parser(
+        "tree", parents=[common], help="build the tree of a scene and tell what it is like"
+    )
+    tree.add_argument("-t", "--threads", type=int, help="threads (default: all)")
+    tree.add_argument("--json", action="store_true", help="print one JSON object")
+    add_tree_cache(tree)
+    add_build_options(tree)
     commands.add_parser("info", parents=[common], help="tell what a scene uses")
     return parser
 
@@ -116,8 +125,9 @@ def run_render(arguments: argparse.Namespace) -> None:
             sensor=arguments.sensor,
             defines=dict(arguments.define),
             resolution=arguments.resolution,
+            tree_cache=arguments.tree_cache,
         )
-        for message in prepared.arrays.warnings:
+        for message in prepared.warnings:
             print(f"mlrt: warning: {message}", file=sys.stderr)
         with ProgressBar("rendering") as progress:
             result = prepared.render(
@@ -143,13 +153,16 @@ def run_info(arguments: argparse.Namespace) -> None:
     print("\n".join(lines))
 
 
+COMMANDS = {"render": run_render, "tree": run_tree, "info": run_info}
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs the command with the given arguments, or those of the process."""
     arguments = make_parser().parse_args(argv)
     level = mitsuba.log_level()
     mitsuba.set_log_level(mi.LogLevel.Info if arguments.verbose else mi.LogLevel.Error)
     try:
-        {"render": run_render, "info": run_info}[arguments.command](arguments)
+        COMMANDS[arguments.command](arguments)
     except KeyboardInterrupt:
         print("mlrt: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED

@@ -21,6 +21,10 @@ class OutputError(MlrtError):
     """An image cannot be written where it is wanted."""
 
 
+class TreeFileError(MlrtError):
+    """A file does not hold the tree that is wanted, or a tree cannot be written to it."""
+
+
 class MlrtWarning(UserWarning):
     """Something in the scene is approximated or ignored; the message names it."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -17,6 +18,8 @@ from .options import AOVS, TRACE_OPTIONS, integer, split_options
 from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
+from .tree_cache import ObtainedTree, obtain_tree
+from .tree_report import tree_report
 
 Progress = Callable[[float], object]
 """Called with the share of the work that is done, from 0 to 1."""
@@ -30,7 +33,8 @@ class RenderResult:
     aovs: by name: depth (H, W) float32, distance from the near plane in scene units, 0 for
     a miss; normal (H, W, 3) float32, shading normal in world space; both are filtered as
     colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss.
-    timings: seconds of load, build and render.
+    timings: seconds of load, build and render; with a cache of trees those that
+    `ObtainedTree` names in place of build.
     counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays.
     warnings: what was approximated or ignored.
     """
@@ -51,11 +55,17 @@ class PreparedScene:
     tree: Any
     build_options: dict[str, Any]
     timings: dict[str, float]
+    tree_warnings: tuple[str, ...] = ()
 
     @property
     def report(self) -> dict[str, Any]:
-        """What the builder did: numbers of nodes, references and splits, cost, seconds."""
-        return dict(self.tree.report)
+        """What the tree is like and what its builder did, see `tree_report`."""
+        return tree_report(self.tree)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is approximated or ignored, a sentence each."""
+        return self.arrays.warnings + self.tree_warnings
 
     def tree_for(self, arrays: SceneArrays, build_options: dict[str, Any]) -> Any:
         """The tree if it is that of other arrays too, bit for bit, else None."""
@@ -71,7 +81,7 @@ class PreparedScene:
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
-        for message in self.arrays.warnings:
+        for message in self.warnings:
             warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
 
     def render(
@@ -109,7 +119,7 @@ class PreparedScene:
             aovs=dict(result["aovs"]),
             timings={**self.timings, "render": time.perf_counter() - start},
             counters=dict(result["counters"]),
-            warnings=self.arrays.warnings,
+            warnings=self.warnings,
         )
 
 
@@ -122,12 +132,14 @@ def prepare(
     hide_emitters: bool | None = None,
     lighting: Lighting | None = None,
     previous: PreparedScene | None = None,
+    tree_cache: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> PreparedScene:
     """Reads a scene and builds its tree; `options` are of `BuildOptions`. See `render`.
 
     lighting: what to render in place of what the scene's integrator asks for.
     previous: a scene whose tree is taken over if the geometry is the same.
+    tree_cache: folder that the tree is taken from if it is there, and kept in if not.
     """
     build, trace = split_options(options)
     if trace:
@@ -142,11 +154,12 @@ def prepare(
     loaded = time.perf_counter()
     tree = previous.tree_for(arrays, build) if previous is not None else None
     if tree is None:
-        tree = core.KdTree(arrays.vertices, arrays.faces, **build)
-    built = time.perf_counter()
+        obtained = obtain_tree(arrays.vertices, arrays.faces, build, tree_cache)
+    else:
+        obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
-        tree,
+        obtained.tree,
         arrays.faces if len(arrays.normals) else arrays.faces[:0],
         arrays.normals,
         [dataclasses.asdict(shape) for shape in arrays.shapes],
@@ -156,8 +169,14 @@ def prepare(
         dataclasses.asdict(arrays.film),
         bool(hide),
     )
-    timings = {"load": loaded - start, "build": built - loaded}
-    return PreparedScene(arrays, handle, tree, build, timings)
+    return PreparedScene(
+        arrays,
+        handle,
+        obtained.tree,
+        build,
+        {"load": loaded - start, **obtained.timings},
+        obtained.warnings,
+    )
 
 
 def render(
@@ -180,8 +199,9 @@ def render(
     sensor. threads: None takes all of Dr.Jit's pool.
     aovs: further images, of depth, normal and prim.
     defines: values of the file's $parameters.
-    params: resolution, a pair (width, height); hide_emitters; progress, called with the
-    share of the work that is done; and the options of `mlrt_plugin.options`, which change
+    params: resolution, a pair (width, height); hide_emitters; tree_cache, a folder that
+    trees are kept in from one process to the next; progress, called with the share of the
+    work that is done; and the options of `mlrt_plugin.options`, which change
     the time that is taken but not the image.
 
     What is approximated or ignored is warned of as MlrtWarning. Raises SceneError if the
@@ -189,7 +209,11 @@ def render(
     MlrtError or ValueError for other arguments that make no sense, TypeError for an
     unknown one, and KeyboardInterrupt within 0.2 s.
     """
-    of_scene = {k: params.pop(k) for k in ("resolution", "hide_emitters") if k in params}
+    of_scene = {
+        name: params.pop(name)
+        for name in ("resolution", "hide_emitters", "tree_cache")
+        if name in params
+    }
     progress = params.pop("progress", None)
     build, trace = split_options(params)
     check_aovs(aovs)

@@ -128,7 +128,7 @@ class SceneArrays:
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
-    each.
+    each. shape_names: what messages call the shapes.
     """
 
     vertices: npt.NDArray[np.float32]
@@ -144,6 +144,7 @@ class SceneArrays:
     base_seed: int
     features: tuple[Feature, ...]
     warnings: tuple[str, ...]
+    shape_names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):

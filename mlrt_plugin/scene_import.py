@@ -343,6 +343,7 @@ def collect(
         base_seed=int(objects.described(sampler, "base_seed", "0")),
         features=found,
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
+        shape_names=tuple(shape_names),
     )
 
 

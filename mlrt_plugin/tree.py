@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -10,6 +12,8 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .options import BUILD_OPTIONS, TRACE_OPTIONS
+from .tree_files import load_tree, save_tree
+from .tree_report import tree_report
 
 
 class Hits(NamedTuple):
@@ -48,19 +52,43 @@ class KdTree:
         Raises ValueError for arrays of another shape or type, and for a face that refers
         to a vertex that does not exist; TypeError for an unknown option.
         """
-        unknown = sorted(set(options) - set(BUILD_OPTIONS))
-        if unknown:
-            raise TypeError(
-                f"unknown option '{unknown[0]}': choose from {', '.join(BUILD_OPTIONS)}"
-            )
         points = triples(vertices, "vertices")
         corners = indices(faces, len(points))
-        self._tree = core.KdTree(points, corners, **options)
+        self._tree = core.KdTree(points, corners, **build_options(options))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the tree to a file, from which `load` gets it back; its faces are not
+        stored.
+
+        The file is written under another name first, so that it is there as a whole or not
+        at all. Raises TreeFileError if it cannot be written.
+        """
+        save_tree(self._tree, Path(path))
+
+    @classmethod
+    def load(
+        cls,
+        path: str | os.PathLike[str],
+        vertices: npt.ArrayLike,
+        faces: npt.ArrayLike,
+        **options: Any,
+    ) -> KdTree:
+        """The tree that was saved to a file, as if it had been built from these arguments.
+
+        Raises TreeFileError if the file does not exist, is damaged, comes from another
+        version, or holds the tree of other vertices, faces or options; and what
+        building raises.
+        """
+        points = triples(vertices, "vertices")
+        corners = indices(faces, len(points))
+        tree = cls.__new__(cls)
+        tree._tree = load_tree(Path(path), points, corners, build_options(options))
+        return tree
 
     @property
     def report(self) -> dict[str, Any]:
-        """What the builder did: numbers of nodes, references and splits, cost, seconds."""
-        return dict(self._tree.report)
+        """What the tree is like and what its builder did, see `tree_report`."""
+        return tree_report(self._tree)
 
     def closest_hit(
         self,
@@ -99,6 +127,15 @@ class KdTree:
         rays = ray_arrays(origins, directions, t_min, t_max)
         occluded: npt.NDArray[np.uint8] = self._tree.any_hit(*rays, trace_options(options))
         return occluded.view(np.bool_)
+
+
+def build_options(options: dict[str, Any]) -> dict[str, Any]:
+    unknown = sorted(set(options) - set(BUILD_OPTIONS))
+    if unknown:
+        raise TypeError(
+            f"unknown option '{unknown[0]}': choose from {', '.join(BUILD_OPTIONS)}"
+        )
+    return options
 
 
 def trace_options(options: dict[str, Any]) -> dict[str, Any]:

@@ -12,5 +12,6 @@ void bind_render(nanobind::module_ &m);
 void bind_render_selftest(nanobind::module_ &m);
 void bind_scene(nanobind::module_ &m);
 void bind_tree(nanobind::module_ &m);
+void bind_tree_files(nanobind::module_ &m);
 
 } // namespace mlrt

@@ -4,6 +4,7 @@
 #include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/build_options.h"
+#include "bind/mesh_arrays.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
@@ -22,37 +23,20 @@ namespace mlrt {
 
 namespace {
 
-using Points = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
-using Faces = nb::ndarray<const uint32_t, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 
 TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
     const BuildOptions build_options = build_options_from(options);
-    const size_t vertex_count = vertices.shape(0), face_count = faces.shape(0);
-    if (face_count > 0x7fffffffu)
-        throw nb::value_error("a tree holds at most 2^31 - 1 faces");
+    std::vector<Triangle> triangles = triangles_of(vertices, faces);
     Watch watch;
     std::optional<BuiltTree> built;
     {
         nb::gil_scoped_release release;
-        std::vector<Triangle> triangles(face_count);
-        for (size_t i = 0; i < face_count; ++i) {
-            Vec3f corner[3];
-            for (int j = 0; j < 3; ++j) {
-                const uint32_t v = faces(i, size_t(j));
-                if (v >= vertex_count)
-                    throw std::out_of_range("face " + std::to_string(i) +
-                                            " refers to vertex " + std::to_string(v) +
-                                            ", but there are only " +
-                                            std::to_string(vertex_count));
-                corner[j] = {vertices(v, 0), vertices(v, 1), vertices(v, 2)};
-            }
-            triangles[i] = {corner[0], corner[1], corner[2]};
-        }
         built = build_kd_tree(std::move(triangles), build_options, [&] { return watch(); });
     }
     watch.rethrow();
-    return {std::make_shared<const KdTree>(std::move(built->tree)), built->report};
+    return {std::make_shared<const KdTree>(std::move(built->tree)), built->report,
+            build_options};
 }
 
 // Rays of a query, one array a component.

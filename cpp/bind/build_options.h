@@ -35,21 +35,53 @@ inline BuildOptions build_options_from(nanobind::handle dict) {
     return options;
 }
 
+// All fields, those that were left at their default included.
+inline nanobind::dict build_options_to_dict(const BuildOptions &options) {
+    nanobind::dict dict;
+    dict["traversal_cost"] = options.traversal_cost;
+    dict["intersection_cost"] = options.intersection_cost;
+    dict["empty_bonus"] = options.empty_bonus;
+    dict["clip"] = options.clip;
+    dict["rule_empty_cell"] = options.rule_empty_cell;
+    dict["rule_flat_cell"] = options.rule_flat_cell;
+    dict["rule_area_floor"] = options.rule_area_floor;
+    dict["empty_cell_share"] = options.empty_cell_share;
+    dict["area_floor"] = options.area_floor;
+    dict["max_depth"] = options.max_depth;
+    return dict;
+}
+
+// Calls visit(name, value) for each field of a report.
+template <typename Report, typename Visit>
+void for_each_field(Report &report, Visit &&visit) {
+    visit("inner_nodes", report.inner_nodes);
+    visit("leaves", report.leaves);
+    visit("empty_leaves", report.empty_leaves);
+    visit("references", report.references);
+    visit("max_leaf_count", report.max_leaf_count);
+    visit("depth", report.depth);
+    visit("empty_cell_splits", report.empty_cell_splits);
+    visit("flat_cell_splits", report.flat_cell_splits);
+    visit("area_floor_leaves", report.area_floor_leaves);
+    visit("dropped_triangles", report.dropped_triangles);
+    visit("sah_cost", report.sah_cost);
+    visit("seconds", report.seconds);
+}
+
 inline nanobind::dict report_to_dict(const BuildReport &report) {
     nanobind::dict dict;
-    dict["inner_nodes"] = report.inner_nodes;
-    dict["leaves"] = report.leaves;
-    dict["empty_leaves"] = report.empty_leaves;
-    dict["references"] = report.references;
-    dict["max_leaf_count"] = report.max_leaf_count;
-    dict["depth"] = report.depth;
-    dict["empty_cell_splits"] = report.empty_cell_splits;
-    dict["flat_cell_splits"] = report.flat_cell_splits;
-    dict["area_floor_leaves"] = report.area_floor_leaves;
-    dict["dropped_triangles"] = report.dropped_triangles;
-    dict["sah_cost"] = report.sah_cost;
-    dict["seconds"] = report.seconds;
+    for_each_field(report, [&](const char *name, auto value) { dict[name] = value; });
     return dict;
+}
+
+// Raises ValueError unless each field is there and fits.
+inline BuildReport report_from_dict(const nanobind::dict &dict) {
+    BuildReport report;
+    for_each_field(report, [&](const char *name, auto &value) {
+        if (!dict.contains(name) || !nanobind::try_cast(dict[name], value))
+            refuse_value("its report has no valid '" + std::string(name) + "'");
+    });
+    return report;
 }
 
 } // namespace mlrt

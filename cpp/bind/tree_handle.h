@@ -10,6 +10,7 @@ namespace mlrt {
 struct TreeHandle {
     std::shared_ptr<const KdTree> tree;
     BuildReport report;
+    BuildOptions options;
 };
 
 } // namespace mlrt

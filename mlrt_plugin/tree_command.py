@@ -1,0 +1,80 @@
+"""The command ``mlrt tree``: builds the tree of a scene and tells what it is like."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from ._dispatch import core
+from .options import BUILD_OPTIONS
+from .render import prepare
+from .threads import thread_count
+from .tree_report import dropped_by_mesh, report_lines
+
+
+def add_tree_cache(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--tree-cache",
+        type=Path,
+        metavar="DIR",
+        help="folder that trees are kept in for the next time",
+    )
+
+
+def add_build_options(parser: argparse.ArgumentParser) -> None:
+    """A flag for each build option, of the type of its default."""
+    group = parser.add_argument_group("options of the builder")
+    for name, default in core.build_options().items():
+        kwargs: dict[str, Any] = {"help": f"default: {default}"}
+        if isinstance(default, bool):
+            kwargs["action"] = argparse.BooleanOptionalAction
+            kwargs["help"] = f"default: {'on' if default else 'off'}"
+        elif not isinstance(default, str):
+            kwargs["type"] = type(default)
+            kwargs["metavar"] = "N"
+            kwargs["help"] = f"default: {default:g}"
+        group.add_argument(f"--{name.replace('_', '-')}", default=None, **kwargs)
+
+
+def build_options_of(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The options that were given; the others keep the builder's default."""
+    given = {name: getattr(arguments, name, None) for name in BUILD_OPTIONS}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def run_tree(arguments: argparse.Namespace) -> None:
+    with thread_count(arguments.threads):
+        prepared = prepare(
+            arguments.scene,
+            sensor=arguments.sensor,
+            defines=dict(arguments.define),
+            tree_cache=arguments.tree_cache,
+            **build_options_of(arguments),
+        )
+        report = prepared.report
+    for message in prepared.warnings:
+        print(f"mlrt: warning: {message}", file=sys.stderr)
+    dropped = dropped_by_mesh(prepared.tree, prepared.arrays)
+    options = core.tree_options(prepared.tree)
+    if arguments.json:
+        figures = {
+            "scene": str(arguments.scene),
+            "options": options,
+            **report,
+            "dropped_by_mesh": dropped,
+            "timings": prepared.timings,
+        }
+        print(json.dumps(figures, indent=2))
+        return
+    lines = report_lines(report)
+    if dropped:
+        lines.append("Dropped triangles:")
+        lines += [f"   {count} of {name}" for name, count in dropped.items()]
+    seconds = ", ".join(f"{name} {value:.3f} s" for name, value in prepared.timings.items())
+    lines.append(f"{arguments.scene}: {seconds}")
+    if arguments.verbose:
+        lines += [f"  {name}: {value}" for name, value in {**options, **report}.items()]
+    print("\n".join(lines))

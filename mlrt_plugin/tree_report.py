@@ -1,0 +1,114 @@
+"""What a tree is like: as numbers, and in the words of Mitsuba's kd-tree log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ._dispatch import core
+from .scene_arrays import SceneArrays
+from .tree_files import NODE_SIZE, REFERENCE_SIZE
+
+TRIANGLE_SIZE = 36
+"""Bytes: three vertices in single precision."""
+
+
+def tree_report(tree: Any) -> dict[str, Any]:
+    """Figures of a tree of the core: what its builder counted, and what a walk finds.
+
+    nodes, inner_nodes, leaves; empty_leaves, without references; flat_leaves, with
+    references and a cell that has no extent along an axis; depth, inner nodes on the
+    longest path. triangles, dropped_triangles: as given, and those of them that are not
+    finite or have no area. references; references_per_triangle that is not dropped;
+    references_per_nonempty_leaf, max_leaf_count; leaf_histogram, leaves with 0, 1, ... 15
+    references. empty_cell_splits, flat_cell_splits, area_floor_leaves: by the paper's
+    rules 1, 2 and 3. expected_traversals, expected_leaf_visits and
+    expected_primitive_visits of a line that crosses the root's cell, and sah_cost, its
+    expected cost in units of one traversal. node_bytes, reference_bytes, triangle_bytes
+    and their sum total_bytes. seconds that building took, once.
+    """
+    options = core.tree_options(tree)
+    report: dict[str, Any] = {**tree.report, **core.tree_statistics(tree)}
+    triangles = len(core.tree_triangles(tree))
+    kept = triangles - report["dropped_triangles"]
+    nonempty = report["leaves"] - report["empty_leaves"]
+    report["nodes"] = report["inner_nodes"] + report["leaves"]
+    report["triangles"] = triangles
+    report["references_per_triangle"] = report["references"] / max(1, kept)
+    report["references_per_nonempty_leaf"] = report["references"] / max(1, nonempty)
+    report["sah_cost"] = (
+        report["expected_traversals"]
+        + options["intersection_cost"]
+        / options["traversal_cost"]
+        * report["expected_primitive_visits"]
+    )
+    report["node_bytes"] = len(core.tree_nodes(tree)) * NODE_SIZE
+    report["reference_bytes"] = len(core.tree_references(tree)) * REFERENCE_SIZE
+    report["triangle_bytes"] = triangles * TRIANGLE_SIZE
+    report["total_bytes"] = (
+        report["node_bytes"] + report["reference_bytes"] + report["triangle_bytes"]
+    )
+    return report
+
+
+def dropped_by_mesh(tree: Any, arrays: SceneArrays) -> dict[str, int]:
+    """How many triangles of each mesh are not finite or have no area, where there are
+    any."""
+    firsts = [shape.first_face for shape in arrays.shapes]
+    owners = np.searchsorted(firsts, core.tree_dropped(tree), side="right") - 1
+    counts: dict[str, int] = {}
+    for shape, count in zip(*np.unique(owners, return_counts=True), strict=True):
+        name = arrays.shape_names[shape] if arrays.shape_names else f"shape {shape}"
+        counts[name] = counts.get(name, 0) + int(count)
+    return counts
+
+
+def report_lines(report: dict[str, Any]) -> list[str]:
+    """The figures of `tree_report` as text; labels are those of Mitsuba where it has
+    them."""
+    structure = {
+        "Triangles": f"{report['triangles']} ({size(report['triangle_bytes'])})",
+        "Dropped triangles": report["dropped_triangles"],
+        "Primitive references": (
+            f"{report['references']} ({size(report['reference_bytes'])})"
+        ),
+        "References/triangle": f"{report['references_per_triangle']:.2f}",
+        "kd-tree nodes": f"{report['nodes']} ({size(report['node_bytes'])})",
+        "kd-tree leaves": f"{report['leaves']}, {report['empty_leaves']} of them empty",
+        "kd-tree depth": report["depth"],
+        "Total storage": size(report["total_bytes"]),
+        "Leaf node histogram": " ".join(
+            f"{count}({leaves})" for count, leaves in enumerate(report["leaf_histogram"])
+        ),
+    }
+    quality = {
+        "Empty cells by rule 1": report["empty_cell_splits"],
+        "Flat cells by rule 2": report["flat_cell_splits"],
+        "Small cells by rule 3": report["area_floor_leaves"],
+        "Largest leaf node": f"{report['max_leaf_count']} primitives",
+        "Avg. prims/nonempty leaf": f"{report['references_per_nonempty_leaf']:.2f}",
+        "Expected traversals/query": f"{report['expected_traversals']:.2f}",
+        "Expected leaf visits/query": f"{report['expected_leaf_visits']:.2f}",
+        "Expected prim. visits/query": f"{report['expected_primitive_visits']:.2f}",
+        "Final cost": f"{report['sah_cost']:.2f}",
+    }
+    return [
+        "Structural kd-tree statistics:",
+        *labelled(structure),
+        "Qualitative kd-tree statistics:",
+        *labelled(quality),
+    ]
+
+
+def labelled(values: dict[str, Any]) -> list[str]:
+    return [f"   {label:<28}: {value}" for label, value in values.items()]
+
+
+def size(count: float) -> str:
+    """A number of bytes with a unit."""
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024:
+            return f"{count:.4g} {unit}"
+        count /= 1024
+    return f"{count:.4g} GiB"

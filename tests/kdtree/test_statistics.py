@@ -1,0 +1,113 @@
+"""The figures of a tree's report, against a walk in Python and against the builder."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+import workloads
+from kd_trees import BuiltTree
+
+from mlrt_plugin import KdTree
+from mlrt_plugin._dispatch import core
+
+SEED = 20261124
+
+SCENES: dict[str, Callable[[np.random.Generator], workloads.Scene]] = {
+    "soup": lambda rng: workloads.soup(rng, 400),
+    "box": lambda rng: workloads.box(),
+    "sphere": lambda rng: workloads.sphere(),
+    "flat": workloads.flat,
+    "one": lambda rng: workloads.soup(rng, 1),
+}
+COSTS = {"traversal_cost": 2.5, "intersection_cost": 4.0}
+
+
+@pytest.fixture(params=SCENES)
+def scene(request: pytest.FixtureRequest) -> workloads.Scene:
+    return SCENES[request.param](np.random.default_rng(SEED))
+
+
+def walked(tree: BuiltTree) -> dict[str, Any]:
+    """The figures as a walk in double precision finds them."""
+    visits = list(tree.walk())
+    scene_area = visits[0].area
+    inner = [v for v in visits if not tree.is_leaf(v.node)]
+    leaves = [v for v in visits if tree.is_leaf(v.node)]
+    counts = [int(tree.count[v.node]) for v in leaves]
+    flat = [v for v in leaves if (v.lo == v.hi).any() and tree.count[v.node]]
+    sizes = Counter(counts)
+    kept = len(tree.triangles) - tree.report["dropped_triangles"]
+    traversals = sum(v.area for v in inner) / scene_area
+    primitives = sum(v.area * n for v, n in zip(leaves, counts, strict=True)) / scene_area
+    return {
+        "nodes": len(visits),
+        "inner_nodes": len(inner),
+        "leaves": len(leaves),
+        "empty_leaves": sizes[0],
+        "flat_leaves": len(flat),
+        "references": sum(counts),
+        "max_leaf_count": max(counts),
+        "depth": max(v.depth for v in visits),
+        "leaf_histogram": [sizes[n] for n in range(16)],
+        "expected_traversals": pytest.approx(traversals, rel=1e-9),
+        "expected_leaf_visits": pytest.approx(
+            sum(v.area for v in leaves) / scene_area, rel=1e-9
+        ),
+        "expected_primitive_visits": pytest.approx(primitives, rel=1e-9),
+        "sah_cost": pytest.approx(traversals + 4.0 / 2.5 * primitives, rel=1e-9),
+        "references_per_triangle": sum(counts) / kept,
+        "references_per_nonempty_leaf": sum(counts) / (len(counts) - sizes[0]),
+        "node_bytes": 8 * len(tree.axis),
+        "reference_bytes": 4 * len(tree.references),
+        "triangle_bytes": 36 * len(tree.triangles),
+        "total_bytes": 8 * len(tree.axis)
+        + 4 * len(tree.references)
+        + 36 * len(tree.triangles),
+    }
+
+
+def test_the_report_is_what_a_walk_finds(scene: workloads.Scene) -> None:
+    vertices, faces = scene
+    expected = walked(BuiltTree(vertices[faces], **COSTS))
+    report = KdTree(vertices, faces, **COSTS).report
+    assert {name: report[name] for name in expected} == expected
+
+
+def test_the_builder_counts_the_same(scene: workloads.Scene) -> None:
+    tree = KdTree(*scene, **COSTS)
+    built, found = tree._tree.report, core.tree_statistics(tree._tree)
+    both = set(built) & set(found)
+    assert both >= {"inner_nodes", "leaves", "empty_leaves", "references", "depth"}
+    assert {name: built[name] for name in both} == {name: found[name] for name in both}
+    assert built["sah_cost"] == pytest.approx(tree.report["sah_cost"], rel=1e-9)
+
+
+def test_a_tree_that_is_one_leaf() -> None:
+    triangle = np.array([[0, 0, 0], [2, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    report = KdTree(*triangle).report
+    assert report["expected_traversals"] == 0
+    assert report["expected_leaf_visits"] == report["expected_primitive_visits"] == 1
+    assert report["sah_cost"] == 1.5
+    assert report["flat_leaves"] == report["leaves"] == 1
+
+
+def test_an_empty_tree() -> None:
+    report = KdTree(np.zeros((0, 3)), np.zeros((0, 3), int)).report
+    assert report["leaves"] == report["empty_leaves"] == report["nodes"] == 1
+    for name in ("expected_traversals", "expected_leaf_visits", "sah_cost", "references"):
+        assert report[name] == 0
+    assert report["references_per_triangle"] == 0
+
+
+def test_dropped_triangles_are_numbered() -> None:
+    vertices, faces = workloads.soup(np.random.default_rng(SEED), 30)
+    vertices[faces[4, 1], 2] = np.nan
+    vertices[faces[11, 0]] = np.inf
+    faces[20, 2] = faces[20, 0]
+    tree = KdTree(vertices, faces)
+    assert tree.report["dropped_triangles"] == 3
+    assert core.tree_dropped(tree._tree).tolist() == [4, 11, 20]
