@@ -18,7 +18,8 @@ inline constexpr uint32_t BUILDER_VERSION = 1;
 // Checks all that traversals rely on: children and references exist, every node has one
 // parent at most and no path is longer than MAX_TREE_DEPTH, planes lie in their cells, and
 // no triangle is referenced that a builder would have dropped. It takes time in proportion
-// to the arrays, whatever they hold. Throws std::invalid_argument, which says what is wrong.
+// to the arrays, whatever they hold. Throws std::invalid_argument, which says what is
+// wrong.
 void restore(KdTree &stored);
 
 } // namespace mlrt
