@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +25,14 @@ def add_tree_cache(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_build_options(parser: argparse.ArgumentParser) -> None:
-    """A flag for each build option, of the type of its default."""
+def add_build_options(
+    parser: argparse.ArgumentParser, names: Sequence[str] = BUILD_OPTIONS
+) -> None:
+    """A flag for each of some build options, of the type of its default."""
     group = parser.add_argument_group("options of the builder")
     for name, default in core.build_options().items():
+        if name not in names:
+            continue
         kwargs: dict[str, Any] = {"help": f"default: {default}"}
         if isinstance(default, bool):
             kwargs["action"] = argparse.BooleanOptionalAction
