@@ -10,11 +10,15 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError
+from .mesh_repair import check_mesh, drop_not_finite, repair_normals, warning_about
 
 
 @dataclass
 class Geometry:
-    """All faces of a scene; see SceneArrays for the shapes of the arrays."""
+    """All faces of a scene; see SceneArrays for the shapes of the arrays.
+
+    dropped: the number of faces of each shape that have a vertex that is not finite.
+    """
 
     vertices: npt.NDArray[np.float32]
     faces: npt.NDArray[np.uint32]
@@ -23,23 +27,35 @@ class Geometry:
     face_counts: list[int]
     vertex_normals: list[bool]
     flip_normals: list[bool]
+    dropped: list[int]
     warnings: list[str]
 
 
 def gather(shapes: list[Any], names: list[str]) -> Geometry:
     """Copies the meshes out of loaded shapes; ``names`` say in messages which is which.
 
-    Raises SceneError for a mesh without faces, with a face that refers to a vertex that
-    does not exist, or with a coordinate that is not finite.
+    Faces with a vertex that is not finite are made points, which no ray hits. Raises
+    SceneError for a mesh without faces, for one with a face that refers to a vertex that
+    does not exist, and for a light that has nothing to glow on.
     """
     vertices, faces, normals = [], [], []
-    interpolated, flipped, first_faces = [], [], []
+    interpolated, flipped, first_faces, not_finite = [], [], [], []
     warnings: list[str] = []
     vertex_count = face_count = 0
     for shape, name in zip(shapes, names, strict=True):
         points = np.array(shape.vertex_positions_buffer(), np.float32).reshape(-1, 3)
         corners = np.array(shape.faces_buffer(), np.uint32).reshape(-1, 3)
-        check_mesh(points, corners, name)
+        check_mesh(len(points), corners, name)
+        dropped = drop_not_finite(points, corners)
+        if dropped and objects.plugin_name(shape) in ("rectangle", "cube"):
+            raise SceneError(
+                f"{name} has a to_world with NaN or infinite entries: repair it"
+            )
+        if shape.emitter() is not None and not has_area(points, corners):
+            raise SceneError(
+                f"{name} glows, but its area is zero or infinite in single precision: "
+                "repair the mesh, or scale the scene"
+            )
         # A rectangle ignores the normals of its vertices.
         smooth = (
             shape.has_vertex_normals()
@@ -47,15 +63,14 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
             and objects.plugin_name(shape) != "rectangle"
         )
         directions = np.zeros_like(points)
+        repaired = 0
         if smooth:
             directions = np.array(shape.vertex_normals_buffer(), np.float32).reshape(-1, 3)
             repaired = repair_normals(directions, points, corners)
-            if repaired:
-                warnings.append(
-                    f"{name} has {repaired} vertex normals that are not finite, as they "
-                    "come about beside degenerate faces: the mean normal of the faces is "
-                    "taken"
-                )
+        warning = warning_about(name, dropped, len(corners), repaired)
+        if warning:
+            warnings.append(warning)
+        not_finite.append(dropped)
         first_faces.append(face_count)
         vertices.append(points)
         faces.append(corners + np.uint32(vertex_count))
@@ -78,53 +93,15 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         face_counts=[len(f) for f in faces],
         vertex_normals=interpolated,
         flip_normals=flipped,
+        dropped=not_finite,
         warnings=warnings,
     )
 
 
-def repair_normals(
-    normals: npt.NDArray[np.float32],
-    vertices: npt.NDArray[np.float32],
-    faces: npt.NDArray[np.uint32],
-) -> int:
-    """Replaces vertex normals (V, 3) that are not finite, in place; returns their number.
-
-    Each becomes the mean of the normals of its faces by area. A vertex of faces without an
-    area, which no ray hits, gets an arbitrary unit vector.
-    """
-    bad: npt.NDArray[np.bool_] = np.any(~np.isfinite(normals), axis=1)
-    count = int(np.count_nonzero(bad))
-    if count:
-        around = faces[bad[faces].any(axis=1)]
-        corners = vertices.astype(np.float64)[around]
-        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        sums = np.zeros(vertices.shape, np.float64)
-        np.add.at(sums, around, areas[:, None])
-        lengths = np.linalg.norm(sums[bad], axis=1, keepdims=True)
-        unit = np.divide(sums[bad], lengths, out=np.zeros((count, 3)), where=lengths > 0)
-        unit[lengths[:, 0] == 0] = (0, 0, 1)
-        normals[bad] = unit
-    return count
-
-
-def check_mesh(
-    vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.uint32], name: str
-) -> None:
-    """Raises SceneError if a mesh, vertices (V, 3) and faces (F, 3), cannot be traced."""
-    if not len(faces):
-        raise SceneError(
-            f"{name} has no faces: its file is truncated, or the shape is not needed"
-        )
-    bad = int(np.count_nonzero(~np.isfinite(vertices).all(axis=1)))
-    if bad:
-        raise SceneError(
-            f"{name} has {bad} of {len(vertices)} vertices with NaN or infinite "
-            "coordinates: "
-            "repair the mesh or its to_world"
-        )
-    largest = int(faces.max())
-    if largest >= len(vertices):
-        raise SceneError(
-            f"{name} has a face that refers to vertex {largest} of {len(vertices)}: "
-            "repair the mesh"
-        )
+def has_area(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.uint32]) -> bool:
+    """Whether the area of a mesh is positive and finite, as lights need it."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        a, b, c = (vertices[faces[:, i]] for i in range(3))
+        products = np.cross(b - a, c - a)
+        area = float(np.sqrt((products * products).sum(axis=1)).sum())
+    return 0 < area < np.inf

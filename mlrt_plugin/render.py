@@ -19,7 +19,7 @@ from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
 from .tree_cache import ObtainedTree, obtain_tree
-from .tree_report import tree_report
+from .tree_report import invisible_meshes, tree_report
 
 Progress = Callable[[float], object]
 """Called with the share of the work that is done, from 0 to 1."""
@@ -175,7 +175,7 @@ def prepare(
         obtained.tree,
         build,
         {"load": loaded - start, **obtained.timings},
-        obtained.warnings,
+        obtained.warnings + invisible_meshes(obtained.tree, arrays),
     )
 
 

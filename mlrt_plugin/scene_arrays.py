@@ -128,7 +128,8 @@ class SceneArrays:
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
-    each. shape_names: what messages call the shapes.
+    each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
+    each shape had a vertex that is not finite; they are points now.
     """
 
     vertices: npt.NDArray[np.float32]
@@ -145,6 +146,7 @@ class SceneArrays:
     features: tuple[Feature, ...]
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
+    not_finite_faces: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):

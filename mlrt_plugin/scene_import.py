@@ -344,6 +344,7 @@ def collect(
         features=found,
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
         shape_names=tuple(shape_names),
+        not_finite_faces=tuple(geometry.dropped),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ._dispatch import core
 from .scene_arrays import SceneArrays
@@ -52,16 +53,44 @@ def tree_report(tree: Any) -> dict[str, Any]:
     return report
 
 
-def dropped_by_mesh(tree: Any, arrays: SceneArrays) -> dict[str, int]:
-    """How many triangles of each mesh are not finite or have no area, where there are
-    any."""
+def dropped_by_shape(tree: Any, arrays: SceneArrays) -> npt.NDArray[np.int64]:
+    """How many triangles of each shape are not finite or have no area."""
     firsts = [shape.first_face for shape in arrays.shapes]
     owners = np.searchsorted(firsts, core.tree_dropped(tree), side="right") - 1
+    return np.bincount(owners, minlength=len(firsts))
+
+
+def shape_name(arrays: SceneArrays, number: int) -> str:
+    return arrays.shape_names[number] if arrays.shape_names else f"shape {number}"
+
+
+def dropped_by_mesh(tree: Any, arrays: SceneArrays) -> dict[str, int]:
+    """The same by the names of the meshes, where there are any."""
     counts: dict[str, int] = {}
-    for shape, count in zip(*np.unique(owners, return_counts=True), strict=True):
-        name = arrays.shape_names[shape] if arrays.shape_names else f"shape {shape}"
-        counts[name] = counts.get(name, 0) + int(count)
+    for number, count in enumerate(dropped_by_shape(tree, arrays)):
+        if count:
+            name = shape_name(arrays, number)
+            counts[name] = counts.get(name, 0) + int(count)
     return counts
+
+
+def invisible_meshes(tree: Any, arrays: SceneArrays) -> tuple[str, ...]:
+    """A sentence on each mesh that no ray hits because its faces have no area.
+
+    Faces without an area are common, and not worth a word where there are others. Those
+    that are not finite have been warned of.
+    """
+    if not tree.report["dropped_triangles"]:
+        return ()
+    not_finite = arrays.not_finite_faces or (0,) * len(arrays.shapes)
+    return tuple(
+        f"{shape_name(arrays, number)} cannot be seen: {count - bad} of its "
+        f"{shape.face_count} faces have no area; repair the mesh or its to_world"
+        for number, (shape, count, bad) in enumerate(
+            zip(arrays.shapes, dropped_by_shape(tree, arrays), not_finite, strict=True)
+        )
+        if count == shape.face_count and bad < count
+    )
 
 
 def report_lines(report: dict[str, Any]) -> list[str]:
