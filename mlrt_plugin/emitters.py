@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,10 @@ import numpy.typing as npt
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
 from .scene_arrays import Emitter, Vec3
+
+SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
+LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
+"""Squares of distances along a diagonal between these are normal numbers."""
 
 
 def read_emitter(
@@ -80,6 +85,27 @@ def read_emitter(
     raise UnsupportedFeature(
         f"{name} is not supported: only point, spot, directional and area are so far"
     )
+
+
+def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> None:
+    """Raises SceneError for a scene in which light cannot fall off.
+
+    It does with the square of the distance, which single precision has no number for in
+    scenes beyond all measure. Directional light does not fall off.
+    bounds: of all that can be hit.
+    """
+    if bounds[0] > bounds[1]:
+        return
+    for light in lights:
+        if light.type == "directional":
+            continue
+        points = [*bounds, light.position] if light.type != "area" else [*bounds]
+        extent = float(np.ptp(np.array(points, np.float64), axis=0).max())
+        if not SMALLEST_EXTENT <= extent <= LARGEST_EXTENT:
+            raise SceneError(
+                f"the scene measures {extent:.3g} with its '{light.type}' light: the "
+                "square of that is out of the range of single precision, scale the scene"
+            )
 
 
 def finite(vector: Vec3, name: str, what: str) -> Vec3:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._dispatch import core
+from .emitters import check_distances
 from .errors import MlrtError, MlrtWarning
 from .options import AOVS, TRACE_OPTIONS, integer, split_options
 from .scene_arrays import Lighting, SceneArrays
@@ -157,6 +158,7 @@ def prepare(
         obtained = obtain_tree(arrays.vertices, arrays.faces, build, tree_cache)
     else:
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
+    check_distances(arrays.emitters, obtained.tree.bounds)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,

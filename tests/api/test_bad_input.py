@@ -195,16 +195,6 @@ def test_obj_file_without_a_last_line_break(scene_file: SceneFile, tmp_path: Pat
     assert len(scene.faces) == 1
 
 
-def test_mesh_in_memory_with_bad_vertices(scalar_variant: None) -> None:
-    mesh = mi.Mesh("blob", 3, 1)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = [0, 0, 0, 1, NAN, 0, 0, 1, float("inf")]
-    parameters["faces"] = [0, 1, 2]
-    with pytest.raises(SceneError, match="2 of 3 vertices with NaN") as caught:
-        import_scene(scene_files.scene_dict(floor=mesh))
-    message_of(caught)
-
-
 @pytest.mark.parametrize("text", ["", "not XML", '<scene version="3.0.0">', "\0\1\2"])
 def test_files_that_are_no_scene(tmp_path: Path, text: str) -> None:
     path = tmp_path / "scene.xml"
