@@ -1,0 +1,35 @@
+// MLRT's side of a benchmark.
+#pragma once
+
+#include "base/counters.h"
+#include "frame.h"
+#include "kdtree/builder.h"
+#include "mesh.h"
+#include "mlrta/trace.h"
+#include "stopwatch.h"
+
+#include <functional>
+
+namespace mlrt::bench {
+
+struct TimedTree {
+    BuiltTree built;
+    Seconds seconds; // from vertices and faces to the tree
+
+    uint64_t bytes() const;
+};
+
+// Returns nothing if it was cancelled.
+std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &options,
+                                    const std::function<bool()> &cancelled);
+
+Seconds render_frame(const KdTree &tree, const View &view, const TraceOptions &options,
+                     const FrameOutput &output);
+
+// What the builder's cost model expects of a line that crosses the scene.
+double sah_cost(const KdTree &tree);
+
+// What tracing the primary rays takes.
+Counters count_primary(const KdTree &tree, const View &view, const TraceOptions &options);
+
+} // namespace mlrt::bench

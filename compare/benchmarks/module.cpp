@@ -1,0 +1,202 @@
+// The Python module of mlrt-bench.
+#include "bind/build_options.h"
+#include "bind/mesh_arrays.h"
+#include "bind/trace_options.h"
+#include "bind/watch.h"
+#include "embree_engine.h"
+#include "mlrt_engine.h"
+#include "render/camera.h"
+
+#include <algorithm>
+#include <iterator>
+#include <malloc.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <optional>
+
+namespace nb = nanobind;
+
+namespace mlrt::bench {
+
+namespace {
+
+using Image = nb::ndarray<float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+using Primitives = nb::ndarray<uint32_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+
+Mesh mesh_from(const Points &vertices, const Faces &faces) {
+    Mesh mesh;
+    mesh.vertices.resize(vertices.shape(0) + 1);
+    for (size_t i = 0; i < vertices.shape(0); ++i)
+        mesh.vertices[i] = {vertices(i, 0), vertices(i, 1), vertices(i, 2)};
+    mesh.faces.resize(faces.shape(0));
+    for (size_t i = 0; i < faces.shape(0); ++i)
+        for (size_t j = 0; j < 3; ++j) {
+            if (faces(i, j) >= vertices.shape(0))
+                refuse_value("faces refer to vertices that do not exist.");
+            mesh.faces[i][j] = faces(i, j);
+        }
+    return mesh;
+}
+
+View view_from(nb::handle dict, uint32_t width, uint32_t height) {
+    Fields fields(dict, "view");
+    Camera camera;
+    camera.origin = fields.vector("origin");
+    camera.axes = {fields.vector("axis_x"), fields.vector("axis_y"),
+                   fields.vector("axis_z")};
+    camera.tan_half_fov_x = fields.number("tan_half_fov_x");
+    camera.near_clip = fields.number("near_clip");
+    camera.far_clip = fields.number("far_clip");
+    camera.principal_point_offset = {fields.number("principal_point_x"),
+                                     fields.number("principal_point_y")};
+    const Vec3f light = fields.vector("light");
+    fields.finish();
+    if (width == 0 || height == 0)
+        refuse_value("width and height must be positive.");
+    Film film;
+    film.width = width;
+    film.height = height;
+    const ImagePlane plane = image_plane(camera, film);
+    return {plane.single, plane.near_clip, plane.far_clip, width, height, light};
+}
+
+FrameOutput output_from(const View &view, const Image &image,
+                        const std::optional<Primitives> &primitives) {
+    if (image.shape(0) != view.height || image.shape(1) != view.width)
+        refuse_value("image must have the shape (height, width) of the view.");
+    if (primitives &&
+        (primitives->shape(0) != view.height || primitives->shape(1) != view.width))
+        refuse_value("primitives must have the shape (height, width) of the view.");
+    return {image.data(), primitives ? primitives->data() : nullptr};
+}
+
+// Names of builders that a tree can be asked for.
+constexpr const char *BUILDERS[] = {"exact"};
+
+BuildOptions options_for(const std::string &builder) {
+    if (std::find(std::begin(BUILDERS), std::end(BUILDERS), builder) == std::end(BUILDERS))
+        refuse_value("there is no builder '" + builder + "'.");
+    return {};
+}
+
+TimedTree built_tree(const Mesh &mesh, const std::string &builder) {
+    const BuildOptions options = options_for(builder);
+    Watch watch;
+    std::optional<TimedTree> tree;
+    {
+        nb::gil_scoped_release release;
+        tree = build_tree(mesh, options, [&] { return watch(); });
+    }
+    watch.rethrow();
+    return std::move(*tree);
+}
+
+void bind_input(nb::module_ &m) {
+    nb::class_<Mesh>(m, "Mesh").def(
+        "__init__",
+        [](Mesh *self, const Points &vertices, const Faces &faces) {
+            new (self) Mesh(mesh_from(vertices, faces));
+        },
+        nb::arg("vertices"), nb::arg("faces"));
+    nb::class_<View>(m, "View").def(
+        "__init__",
+        [](View *self, const nb::dict &view, uint32_t width, uint32_t height) {
+            new (self) View(view_from(view, width, height));
+        },
+        nb::arg("view"), nb::arg("width"), nb::arg("height"));
+    nb::class_<Seconds>(m, "Seconds")
+        .def_ro("wall", &Seconds::wall)
+        .def_ro("cpu", &Seconds::cpu);
+}
+
+void bind_mlrt(nb::module_ &m) {
+    nb::class_<TimedTree>(m, "KdTree")
+        .def(
+            "__init__",
+            [](TimedTree *self, const Mesh &mesh, const std::string &builder) {
+                new (self) TimedTree(built_tree(mesh, builder));
+            },
+            nb::arg("mesh"), nb::arg("builder"))
+        .def_prop_ro("seconds", [](const TimedTree &self) { return self.seconds; })
+        .def_prop_ro("bytes", &TimedTree::bytes)
+        .def(
+            "sah_cost", [](const TimedTree &self) { return sah_cost(self.built.tree); },
+            "Found by walking the tree, in units of a traversal step.")
+        .def_prop_ro(
+            "report",
+            [](const TimedTree &self) { return report_to_dict(self.built.report); })
+        .def(
+            "render",
+            [](const TimedTree &self, const View &view, const nb::dict &options,
+               const Image &image, const std::optional<Primitives> &primitives) {
+                const TraceOptions trace_options = trace_options_from(options);
+                const FrameOutput output = output_from(view, image, primitives);
+                nb::gil_scoped_release release;
+                return render_frame(self.built.tree, view, trace_options, output);
+            },
+            nb::arg("view"), nb::arg("options"), nb::arg("image"),
+            nb::arg("primitives").none() = nb::none())
+        .def(
+            "count_primary",
+            [](const TimedTree &self, const View &view, const nb::dict &options) {
+                const TraceOptions trace_options = trace_options_from(options);
+                Counters counters;
+                {
+                    nb::gil_scoped_release release;
+                    counters = count_primary(self.built.tree, view, trace_options);
+                }
+                return counters_to_dict(counters);
+            },
+            nb::arg("view"), nb::arg("options"));
+}
+
+void bind_embree(nb::module_ &m) {
+    nb::class_<EmbreeDevice>(m, "EmbreeDevice")
+        .def(nb::init<const std::string &>(), nb::arg("configuration"))
+        .def_prop_ro("version", &EmbreeDevice::version)
+        .def_prop_ro("has_native_packets", &EmbreeDevice::has_native_packets)
+        .def_prop_ro("bytes", &EmbreeDevice::bytes);
+    nb::class_<EmbreeScene>(m, "EmbreeScene")
+        .def(
+            "__init__",
+            [](EmbreeScene *self, EmbreeDevice &device, const Mesh &mesh, bool high) {
+                nb::gil_scoped_release release;
+                new (self) EmbreeScene(
+                    device, mesh, high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+            },
+            nb::arg("device"), nb::arg("mesh"), nb::arg("high"), nb::keep_alive<1, 2>(),
+            nb::keep_alive<1, 3>())
+        .def_prop_ro("seconds", [](const EmbreeScene &self) { return self.seconds(); })
+        .def_prop_ro("bytes", &EmbreeScene::bytes)
+        .def_prop_ro("peak_bytes", &EmbreeScene::peak_bytes)
+        .def(
+            "render",
+            [](const EmbreeScene &self, const View &view, const Image &image,
+               const std::optional<Primitives> &primitives) {
+                const FrameOutput output = output_from(view, image, primitives);
+                nb::gil_scoped_release release;
+                return render_frame(self, view, output);
+            },
+            nb::arg("view"), nb::arg("image"), nb::arg("primitives").none() = nb::none());
+}
+
+} // namespace
+
+} // namespace mlrt::bench
+
+NB_MODULE(MLRT_MODULE, m) {
+    using namespace mlrt::bench;
+    m.attr("isa") = MLRT_ISA_NAME;
+    nb::list builders;
+    for (const char *name : BUILDERS)
+        builders.append(name);
+    m.attr("builders") = builders;
+    m.def(
+        "release_memory", [] { malloc_trim(0); },
+        "Returns freed memory to the system, so that the next piece of work starts as in "
+        "a fresh process.");
+    bind_input(m);
+    bind_mlrt(m);
+    bind_embree(m);
+}

@@ -1,0 +1,1 @@
+"""mlrt-bench: MLRT beside Embree on the same rays, in one process, in turns."""

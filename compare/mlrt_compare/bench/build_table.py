@@ -1,0 +1,136 @@
+"""The figures of `mlrt-bench build` as text."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .goals import counted_runs, seconds
+from .measure import best, median
+
+COLUMNS = (
+    *("", "build s", "CPU s", "frame s", "CPU s", "build + frame s", "runs"),
+    *("MB", "bytes/tri", "peak MB", "SAH cost", "ATS", "from root"),
+)
+
+
+def machine_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
+    return [
+        f"{machine['processor']}, {machine['cores']} cores, {machine['isa']}, "
+        f"{machine['compiler']}",
+        f"MLRT {machine['mlrt']} at {(machine['commit'] or 'no commit')[:10]}, Embree of "
+        f"Mitsuba {machine['mitsuba']}; load {machine['load'][0]:.1f}",
+        f"frame: {settings['resolution']} x {settings['resolution']}, a primary ray a "
+        "pixel and a shadow ray a hit; seconds: best (median) of the runs that others left "
+        "alone, which are counted of all runs",
+    ]
+
+
+def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
+    """The table of one scene and number of threads."""
+    rows: list[tuple[str, ...]] = [COLUMNS]
+    for contender in block["contenders"]:
+        rows.append(contender_row(contender, scene))
+    title = f"{scene['name']}, {scene['triangles']} triangles, {plural(block['threads'])}"
+    return ["", title, *aligned(rows)]
+
+
+def contender_row(contender: dict[str, Any], scene: dict[str, Any]) -> tuple[str, ...]:
+    runs = counted_runs(contender)
+    peak = scene["resident_peak_bytes"][contender["name"]]
+    steps = scene["ats"].get(contender["name"], {})
+    return (
+        contender["name"],
+        spread(seconds(contender, ("build",))),
+        number(best(run["build"]["cpu"] for run in runs)),
+        spread(seconds(contender, ("frame",))),
+        number(best(run["frame"]["cpu"] for run in runs)),
+        spread(seconds(contender, ("build", "frame"))),
+        f"{sum(not run['busy'] for run in runs)}/{len(contender['runs'])}",
+        megabytes(contender["bytes"]),
+        f"{contender['bytes'] / max(scene['triangles'], 1):.1f}",
+        "-" if peak is None else megabytes(peak),
+        number(scene["sah_cost"].get(contender["name"])),
+        number(steps.get("with_entry_points")),
+        number(steps.get("from_the_root")),
+    )
+
+
+def scene_lines(scene: dict[str, Any]) -> list[str]:
+    """What holds for all numbers of threads of a scene."""
+    agreement = scene["agreement"]
+    differing = agreement["differing"]
+    lines = [
+        f"  of {agreement['pixels']} pixels MLRT and Embree differ in the triangle at "
+        f"{differing['primitive']}, in hit or miss at {differing['hit']}, in brightness at "
+        f"{differing['image']}"
+    ]
+    if not agreement["mlrt_trees_give_one_image"]:
+        lines.append("  MLRT's trees do NOT give one image: this is a defect")
+    for block in scene["blocks"]:
+        for contender in block["contenders"]:
+            share = contender.get("report", {}).get("built_share")
+            if contender["name"] == "MLRT lazy" and share is not None:
+                lines.append(
+                    f"  lazy, {plural(block['threads'])}: {100 * share:.1f} % of the tree "
+                    "was built after the frame"
+                )
+    return lines
+
+
+def goal_lines(scenes: list[dict[str, Any]]) -> list[str]:
+    """All goals: a row a scene and number of threads, a column a goal."""
+    rows: list[tuple[str, ...]] = []
+    for scene in scenes:
+        for block in scene.get("blocks", ()):
+            goals = block["goals"]
+            if not goals:
+                continue
+            if not rows:
+                heads = [f"{goal['name']} <= {goal['limit']:g}" for goal in goals]
+                rows.append(("goals: best (median)", *heads))
+            name = f"{scene['name']}, {plural(block['threads'])}"
+            rows.append((name, *(verdict(goal) for goal in goals)))
+    return ["", *aligned(rows)] if rows else []
+
+
+def verdict(goal: dict[str, Any]) -> str:
+    ratio = f"{goal['best']:.2f}"
+    if goal["median"] != goal["best"]:
+        ratio += f" ({goal['median']:.2f})"
+    return f"{ratio} {goal['verdict']}"
+
+
+def plural(threads: int) -> str:
+    return f"{threads} thread{'s' if threads != 1 else ''}"
+
+
+def spread(values: list[float]) -> str:
+    return f"{number(best(values))} ({number(median(values))})"
+
+
+def number(value: float | None) -> str:
+    """Three significant digits, never in powers of ten."""
+    if value is None:
+        return "-"
+    if value == 0:
+        return "0"
+    digits = 2
+    while digits < 7 and abs(value) < 10 ** (2 - digits):
+        digits += 1
+    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.{digits}f}"
+
+
+def megabytes(count: float) -> str:
+    return number(count / 1e6)
+
+
+def aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    """Columns of equal width: the first to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join(
+            [row[0].ljust(widths[0])]
+            + [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
+        ).rstrip()
+        for row in rows
+    ]

@@ -1,0 +1,80 @@
+"""What the kd-tree is meant to reach beside Embree, and whether it does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from .measure import best, median
+
+Block = dict[str, Any]
+"""Figures of one number of threads, as `mlrt-bench build` writes them."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A ratio and its limit. Of seconds there are two, of the best runs and of the medians;
+    a goal that only one of them reaches is left open."""
+
+    name: str
+    best: float
+    median: float
+    limit: float
+
+    @property
+    def verdict(self) -> str:
+        met = {self.best <= self.limit, self.median <= self.limit}
+        return "open" if len(met) == 2 else "met" if True in met else "missed"
+
+    def as_dict(self) -> dict[str, Any]:
+        return {**asdict(self), "verdict": self.verdict}
+
+
+def counted_runs(contender: dict[str, Any]) -> list[dict[str, Any]]:
+    """The runs that nobody disturbed; all if there is none."""
+    runs: list[dict[str, Any]] = contender["runs"]
+    return [run for run in runs if not run["busy"]] or runs
+
+
+def seconds(contender: dict[str, Any], parts: tuple[str, ...]) -> list[float]:
+    """Wall-clock seconds of each run that counts."""
+    return [sum(run[part]["wall"] for part in parts) for run in counted_runs(contender)]
+
+
+def goals_of(block: Block, sah_costs: dict[str, float]) -> Iterator[Goal]:
+    """The goals that the contenders of a block are there for.
+
+    sah_costs: of MLRT's trees, by the name of the contender.
+    """
+    by_name = {contender["name"]: contender for contender in block["contenders"]}
+    fast, lazy = by_name.get("MLRT fast"), by_name.get("MLRT lazy")
+    medium, high = by_name["Embree MEDIUM"], by_name["Embree HIGH"]
+
+    def of_seconds(
+        name: str,
+        limit: float,
+        own: dict[str, Any],
+        other: dict[str, Any],
+        parts: tuple[str, ...],
+    ) -> Goal:
+        def ratio(pick: Callable[[list[float]], float]) -> float:
+            return pick(seconds(own, parts)) / pick(seconds(other, parts))
+
+        return Goal(name, ratio(best), ratio(median), limit)
+
+    def of_numbers(name: str, limit: float, own: float, other: float) -> Goal:
+        return Goal(name, own / other, own / other, limit)
+
+    if fast is not None:
+        yield of_seconds("build fast / HIGH", 3.0, fast, high, ("build",))
+        for peer, kind in ((medium, "MEDIUM"), (high, "HIGH")):
+            yield of_numbers(f"bytes fast / {kind}", 1.5, fast["bytes"], peer["bytes"])
+    if lazy is not None:
+        yield of_seconds(
+            "build + frame lazy / MEDIUM", 1.0, lazy, medium, ("build", "frame")
+        )
+    if {"MLRT fast", "MLRT exact"} <= sah_costs.keys():
+        yield of_numbers(
+            "SAH cost fast / exact", 1.05, sah_costs["MLRT fast"], sah_costs["MLRT exact"]
+        )

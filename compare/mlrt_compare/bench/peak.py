@@ -1,0 +1,78 @@
+"""The most memory that a build takes, found by processes that do nothing else.
+
+In a process that has built before, freed memory that the system never got back would hide
+a part of it.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from mlrt_plugin.threads import thread_count
+
+from .contenders import contenders_of, embree_device
+from .native import loaded
+from .scenes import BenchScene, read_stored, store
+
+OWN_PROCESS = Path("/proc/self")
+
+
+def resident_peaks(
+    library: Path, scene: BenchScene, names: Iterable[str], threads: int
+) -> dict[str, int | None]:
+    """Bytes by the name of a contender; None where the system does not tell."""
+    peaks: dict[str, int | None] = {}
+    with tempfile.TemporaryDirectory(prefix="mlrt-bench-") as folder:
+        file = Path(folder) / "scene.npz"
+        store(file, scene)
+        for name in names:
+            # -P: a checkout that is the current folder holds packages without native core.
+            command = [sys.executable, "-P", "-m", __name__, library, file, name, threads]
+            child = subprocess.run(
+                list(map(str, command)), capture_output=True, text=True, check=False
+            )
+            text = child.stdout.strip()
+            peaks[name] = int(text) if child.returncode == 0 and text.isdecimal() else None
+    return peaks
+
+
+def grown_bytes(library: Path, file: Path, name: str, threads: int) -> int | None:
+    """By how much the memory of this process grows at most while it builds."""
+    module = loaded(library)
+    scene = read_stored(file, "")
+    mesh = module.Mesh(scene.vertices, scene.faces)
+    with thread_count(threads):
+        device = embree_device(module, threads)
+        contender = next(c for c in contenders_of(module, device) if c.name == name)
+        if not forget_peak():
+            return None
+        before = resident_bytes("VmRSS")
+        built = contender.build(mesh)
+        peak = resident_bytes("VmHWM")
+        del built
+    return max(peak - before, 0)
+
+
+def resident_bytes(key: str) -> int:
+    """`VmRSS`, the memory that is resident, or `VmHWM`, the most since `forget_peak`."""
+    for line in (OWN_PROCESS / "status").read_text().splitlines():
+        if line.startswith(key + ":"):
+            return 1024 * int(line.split()[1])
+    raise OSError(f"the system does not tell {key}")
+
+
+def forget_peak() -> bool:
+    """Makes `VmHWM` start from what is resident now, where the system can do that."""
+    try:
+        (OWN_PROCESS / "clear_refs").write_text("5")
+    except OSError:
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    print(grown_bytes(Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3], int(sys.argv[4])))
