@@ -17,6 +17,7 @@ TRACE_OPTIONS = (
 """Fields of ``TraceOptions`` in ``cpp/mlrta/trace.h``."""
 
 BUILD_OPTIONS = (
+    "builder",
     "traversal_cost",
     "intersection_cost",
     "empty_bonus",

@@ -25,6 +25,10 @@ using FloatPacket = drjit::Packet<float, PACKET_WIDTH>;
 using DoublePacket = drjit::Packet<double, PACKET_WIDTH>;
 using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 
+// Four lanes: the coordinates of a point, and whatever lies behind them in memory.
+using PointPacket = drjit::Packet<float, 4>;
+using PointIndices = drjit::Packet<int32_t, 4>;
+
 // What comparing two T gives: bool, or one truth value a lane.
 template <typename T>
 using MaskOf = drjit::mask_t<T>;

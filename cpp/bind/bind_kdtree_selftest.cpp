@@ -36,10 +36,10 @@ Point point(Vec3f v) {
     return {v.x, v.y, v.z};
 }
 
-std::vector<Triangle> triangles_of(const TriangleArray &array) {
-    std::vector<Triangle> triangles(array.shape(0));
+HugeArray<Triangle> triangles_of(const TriangleArray &array) {
+    HugeArray<Triangle> triangles(array.shape(0));
     if (!triangles.empty())
-        std::memcpy(triangles.data(), array.data(), triangles.size() * sizeof(Triangle));
+        std::memcpy(static_cast<void *>(triangles.data()), array.data(), triangles.bytes());
     return triangles;
 }
 
@@ -54,7 +54,7 @@ nb::object array_of(std::vector<T> values) {
 }
 
 nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
-    std::vector<Triangle> triangles = triangles_of(array);
+    HugeArray<Triangle> triangles = triangles_of(array);
     const BuildOptions options = build_options_from(kwargs);
     BuiltTree built;
     {
@@ -83,7 +83,8 @@ nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
     d["child"] = array_of(std::move(child));
     d["first_reference"] = array_of(std::move(first));
     d["count"] = array_of(std::move(count));
-    d["references"] = array_of(std::vector<uint32_t>(tree.references));
+    d["references"] =
+        array_of(std::vector<uint32_t>(tree.references.begin(), tree.references.end()));
     d["lo"] = point(tree.bounds.lo);
     d["hi"] = point(tree.bounds.hi);
     d["depth"] = tree.depth;

@@ -9,6 +9,7 @@
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
 #include "geometry/triangle_test.h"
+#include "kdtree/chunks.h"
 
 #include <memory>
 #include <mutex>
@@ -27,7 +28,7 @@ using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device:
 
 TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
     const BuildOptions build_options = build_options_from(options);
-    std::vector<Triangle> triangles = triangles_of(vertices, faces);
+    HugeArray<Triangle> triangles = triangles_of(vertices, faces);
     Watch watch;
     std::optional<BuiltTree> built;
     {

@@ -6,11 +6,24 @@
 
 namespace mlrt {
 
+inline const EnumNames<Builder> BUILDERS{{"auto", Builder::automatic},
+                                         {"exact", Builder::exact},
+                                         {"fast", Builder::fast},
+                                         {"lazy", Builder::lazy}};
+
+inline const char *name_of(Builder builder) {
+    for (const auto &[name, value] : BUILDERS)
+        if (value == builder)
+            return name;
+    return "";
+}
+
 // Fields that are missing keep their default. Raises ValueError for an unknown one or a bad
 // value.
 inline BuildOptions build_options_from(nanobind::handle dict) {
     Fields fields(dict, "options");
     BuildOptions options;
+    options.builder = fields.choice<Builder>("builder", BUILDERS, options.builder);
     options.traversal_cost = fields.number("traversal_cost", options.traversal_cost);
     options.intersection_cost =
         fields.number("intersection_cost", options.intersection_cost);
@@ -38,6 +51,7 @@ inline BuildOptions build_options_from(nanobind::handle dict) {
 // All fields, those that were left at their default included.
 inline nanobind::dict build_options_to_dict(const BuildOptions &options) {
     nanobind::dict dict;
+    dict["builder"] = name_of(options.builder);
     dict["traversal_cost"] = options.traversal_cost;
     dict["intersection_cost"] = options.intersection_cost;
     dict["empty_bonus"] = options.empty_bonus;
@@ -66,10 +80,15 @@ void for_each_field(Report &report, Visit &&visit) {
     visit("dropped_triangles", report.dropped_triangles);
     visit("sah_cost", report.sah_cost);
     visit("seconds", report.seconds);
+    visit("seconds_bounds", report.seconds_bounds);
+    visit("seconds_top", report.seconds_top);
+    visit("seconds_subtrees", report.seconds_subtrees);
+    visit("seconds_join", report.seconds_join);
 }
 
 inline nanobind::dict report_to_dict(const BuildReport &report) {
     nanobind::dict dict;
+    dict["builder"] = name_of(report.builder);
     for_each_field(report, [&](const char *name, auto value) { dict[name] = value; });
     return dict;
 }
@@ -77,6 +96,8 @@ inline nanobind::dict report_to_dict(const BuildReport &report) {
 // Raises ValueError unless each field is there and fits.
 inline BuildReport report_from_dict(const nanobind::dict &dict) {
     BuildReport report;
+    report.builder =
+        Fields(dict, "its report").choice<Builder>("builder", BUILDERS, Builder::exact);
     for_each_field(report, [&](const char *name, auto &value) {
         if (!dict.contains(name) || !nanobind::try_cast(dict[name], value))
             refuse_value("its report has no valid '" + std::string(name) + "'");

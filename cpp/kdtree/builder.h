@@ -1,4 +1,4 @@
-// Building the kd-tree: the exact event sweep.
+// Building the kd-tree: options, report, and the choice of the builder.
 #pragma once
 
 #include "kdtree/tree.h"
@@ -6,13 +6,20 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <vector>
 
 namespace mlrt {
+
+enum class Builder {
+    automatic, // exact for small scenes, fast for large ones
+    exact,     // sorted events: O(N log N), every plane is tried (Wald and Havran 2006)
+    fast,      // bins: O(N log N), nearly as good, uses all threads
+    lazy       // the fast builder's tree, built where rays go
+};
 
 // Constants of the cost model and of the paper's three rules (Reshetov et al. 2005,
 // section 3.2), each rule with a switch of its own.
 struct BuildOptions {
+    Builder builder = Builder::automatic;
     float traversal_cost = 1.0f;    // K_T: one step through an inner node
     float intersection_cost = 1.5f; // K_I: one packet against one triangle
     float empty_bonus = 0.8f; // factor on the cost of a split that cuts off empty space
@@ -27,6 +34,7 @@ struct BuildOptions {
 
 // What the builder did; all counts are of the finished tree unless said otherwise.
 struct BuildReport {
+    Builder builder = Builder::exact; // that was chosen
     uint64_t inner_nodes = 0;
     uint64_t leaves = 0;
     uint64_t empty_leaves = 0;
@@ -37,8 +45,15 @@ struct BuildReport {
     uint64_t flat_cell_splits = 0;  // taken by rule 2
     uint64_t area_floor_leaves = 0; // ended by rule 3 (b)
     uint64_t dropped_triangles = 0; // not finite or of zero area: never referenced
-    double sah_cost = 0; // expected cost of a ray, in units of traversal_cost = 1
-    double seconds = 0;
+    double sah_cost = 0;         // expected cost of a ray, in units of traversal_cost = 1
+    double seconds = 0;          // in all; of which:
+    double seconds_bounds = 0;   // bounds of the triangles
+    double seconds_top = 0;      // the upper part, all threads on one cell after the other
+    double seconds_subtrees = 0; // the lower part, a subtree a thread
+    double seconds_join = 0;     // putting subtrees together
+
+    // Adds the counts of another part of the tree.
+    void add(const BuildReport &part);
 };
 
 struct BuiltTree {
@@ -46,9 +61,10 @@ struct BuiltTree {
     BuildReport report;
 };
 
-// Builds a tree with perfect splits in O(N log N) (Wald and Havran 2006, section 4.3). The
-// tree depends on nothing but the arguments.
-std::optional<BuiltTree> build_kd_tree(std::vector<Triangle> triangles,
+// Builds a tree. It depends on nothing but the arguments, the number of threads least of
+// all. Gives nothing if it was cancelled, which is asked on the calling thread only.
+// Throws std::length_error for scenes that no tree can hold.
+std::optional<BuiltTree> build_kd_tree(HugeArray<Triangle> triangles,
                                        const BuildOptions &options = {},
                                        const std::function<bool()> &cancelled = {});
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "geometry/triangle.h"
-#include "kdtree/builder.h"
+#include "kdtree/reference.h"
 
 #include <array>
 #include <cstdint>
@@ -10,12 +10,6 @@
 #include <vector>
 
 namespace mlrt {
-
-// A triangle and the bounds of its part in the cell.
-struct Reference {
-    Box3f bounds;
-    uint32_t triangle;
-};
 
 // Where the bounds of a reference begin or end along an axis, or both if they are flat.
 // Wald and Havran 2006, section 4.2; at equal positions ends come first, starts last.
@@ -54,13 +48,6 @@ struct CellContents {
 
 // Sorts the events of `references`, whose bounds are given.
 CellContents make_contents(std::vector<Reference> references);
-
-// A plane {x[axis] = position}, and the child that gets what lies in it.
-struct SplitPlane {
-    int axis = 0;
-    float position = 0;
-    bool planar_below = true;
-};
 
 // Distributes the contents of a cell to its two children in time linear in their number,
 // plus sorting for what the plane cuts in two (Wald and Havran 2006, section 4.3).

@@ -3,6 +3,8 @@
 
 #include "base/check.h"
 
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
 
 namespace mlrt {
@@ -13,7 +15,11 @@ namespace mlrt {
 // info, from the low bit: 2 bits axis (3 marks a leaf), then
 //   inner node: 30 bits index of the lower child
 //   leaf:        6 bits flags, 24 bits count of references
-class KdNode {
+//
+// A leaf that is not built yet holds the number of what is to be built in its payload, and
+// at least one reference by its count: whoever only asks whether something may lie in it
+// needs no more.
+class alignas(8) KdNode {
 public:
     static constexpr uint32_t LEAF = 3;
     static constexpr uint32_t MAX_NODES = 1u << 30;
@@ -35,6 +41,12 @@ public:
         return node;
     }
 
+    static KdNode unbuilt(uint32_t number, uint64_t count) {
+        KdNode node = leaf(number, uint32_t(std::min<uint64_t>(count, MAX_LEAF_COUNT)));
+        node.info_ |= UNBUILT;
+        return node;
+    }
+
     bool is_leaf() const { return (info_ & 3u) == LEAF; }
 
     // Of an inner node.
@@ -46,7 +58,13 @@ public:
     uint32_t first_reference() const { return payload_.first_reference; }
     uint32_t reference_count() const { return info_ >> 8; }
 
+    // Of a leaf.
+    bool is_unbuilt() const { return (info_ & (UNBUILT | 3u)) == (UNBUILT | LEAF); }
+    uint32_t number() const { return payload_.first_reference; }
+
 private:
+    static constexpr uint32_t UNBUILT = 1u << 2;
+
     union {
         float split;
         uint32_t first_reference;
@@ -55,5 +73,18 @@ private:
 };
 
 static_assert(sizeof(KdNode) == 8);
+
+// A node that another thread may be replacing by what it has built: sees either the old
+// node or the new one and all that lies below it.
+inline KdNode load_node(const KdNode &node) {
+    return std::atomic_ref<KdNode>(const_cast<KdNode &>(node))
+        .load(std::memory_order_acquire);
+}
+
+inline void publish_node(KdNode &place, KdNode node) {
+    std::atomic_ref<KdNode>(place).store(node, std::memory_order_release);
+}
+
+static_assert(std::atomic_ref<KdNode>::is_always_lock_free);
 
 } // namespace mlrt

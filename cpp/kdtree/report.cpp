@@ -28,7 +28,7 @@ TreeStatistics statistics_of(const KdTree &tree) {
     while (!stack.empty()) {
         const Visit visit = stack.back();
         stack.pop_back();
-        const KdNode node = tree.nodes[visit.node];
+        const KdNode node = load_node(tree.nodes[visit.node]);
         const double area = surface_area(visit.cell);
         statistics.depth = std::max(statistics.depth, visit.depth);
         if (!node.is_leaf()) {

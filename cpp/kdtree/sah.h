@@ -52,7 +52,7 @@ public:
         share_per_length_ = (u + v) / area;
     }
 
-    double operator()(float position, uint64_t lower_count, uint64_t upper_count) const {
+    double operator()(double position, uint64_t lower_count, uint64_t upper_count) const {
         const double lower = base_share_ + share_per_length_ * (position - lo_);
         const double upper = base_share_ + share_per_length_ * (hi_ - position);
         const double cost = traversal_ + intersection_ * (lower * double(lower_count) +

@@ -117,6 +117,8 @@ private:
     }
 
     void check_leaf(uint32_t index, KdNode node, Walk &walk) {
+        if (node.is_unbuilt())
+            refuse(name_of(index) + " is not built");
         const uint64_t first = node.first_reference(), count = node.reference_count();
         if (count > 0 && first + count > tree_.references.size())
             refuse(name_of(index) + " has references that do not exist");

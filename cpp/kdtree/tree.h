@@ -1,15 +1,18 @@
 // The kd-tree as traversals see it.
 #pragma once
 
+#include "base/huge_array.h"
 #include "base/vec.h"
 #include "geometry/triangle.h"
 #include "kdtree/node.h"
 
 #include <cstdint>
+#include <memory>
 #include <span>
-#include <vector>
 
 namespace mlrt {
+
+class LazyGrowth;
 
 // A tree over triangles. Node 0 is the root and its cell is `bounds`; a cell is closed, so
 // children share their split plane.
@@ -20,15 +23,28 @@ namespace mlrt {
 // a split plane is found by whoever visits all cells that contain it, those that are
 // entered just where the best hit lies included.
 struct KdTree {
-    Box3f bounds;              // of all referenced triangles; empty for an empty tree
-    std::vector<KdNode> nodes; // at least one: an empty tree is one empty leaf
-    std::vector<uint32_t> references; // numbers of triangles, leaf by leaf
-    std::vector<Triangle> triangles;  // every face that was given, in its order
-    int depth = 0;                    // inner nodes on the longest path from the root
+    Box3f bounds;                   // of all referenced triangles; empty for an empty tree
+    HugeArray<KdNode> nodes;        // at least one: an empty tree is one empty leaf
+    HugeArray<uint32_t> references; // numbers of triangles, leaf by leaf
+    HugeArray<Triangle> triangles;  // every face that was given, in its order
+    int depth = 0;                  // inner nodes on the longest path from the root
+
+    // What is not built yet; none if all is. Nodes and references that are added lie in
+    // the arrays' capacity.
+    std::shared_ptr<LazyGrowth> growth;
+
+    // The node, after building it if that has not been done. From any thread.
+    KdNode node(uint32_t index) const {
+        const KdNode node = load_node(nodes[index]);
+        return node.is_unbuilt() ? built_node(index) : node;
+    }
 
     std::span<const uint32_t> references_of(KdNode leaf) const {
         return {references.data() + leaf.first_reference(), leaf.reference_count()};
     }
+
+private:
+    KdNode built_node(uint32_t index) const;
 };
 
 // No path from the root to a leaf is longer than this: traversal stacks are sized by it.

@@ -46,7 +46,7 @@ template <typename Judge, typename Stack>
 bool find_leaf(std::span<const KdNode> nodes, Place &place, Judge &judge, Stack &stack,
                int &pending) {
     for (;;) {
-        const KdNode node = nodes[place.node];
+        const KdNode node = load_node(nodes[place.node]);
         judge.visit(place.node);
         if (!node.is_leaf()) {
             const Sides sides = judge.sides(place.node, node, place.cell);

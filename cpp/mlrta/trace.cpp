@@ -87,14 +87,15 @@ private:
             !tile_beam(*tile_, first, count, greatest_t_max(first, count), beam))
             beam = ray_beam(rays_, first, count);
         BeamJudge judge(beam, options_, counters_);
-        const std::optional<Entry> entry = search_entry_point(tree_.nodes, parent, judge);
+        const std::optional<Entry> entry =
+            search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge);
         if (!entry) {
             ++counters_.missed_tiles;
             return;
         }
         const uint32_t minimum =
             std::max(options_.minimum_tile * options_.minimum_tile, PACKET_WIDTH);
-        if (count <= minimum || tree_.nodes[entry->node].is_leaf()) {
+        if (count <= minimum || tree_.node(entry->node).is_leaf()) {
             trace_packets(first, count, *entry);
             return;
         }

@@ -79,7 +79,7 @@ void trace_interval(const KdTree &tree, const RayPacket<Origin> &rays, LaneBits 
 
     uint32_t node_index = entry.node;
     for (;;) {
-        const KdNode node = tree.nodes[node_index];
+        const KdNode node = tree.node(node_index);
         ++counters.traversal_steps;
         if (!node.is_leaf()) {
             const int side = interval_detail::origin_side(rays, lanes, node);

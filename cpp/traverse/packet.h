@@ -73,7 +73,7 @@ void trace_packet(const KdTree &tree, const RayPacket<Origin> &rays, const Entry
                     state.searching;
             continue;
         }
-        const KdNode node = tree.nodes[node_index];
+        const KdNode node = tree.node(node_index);
         ++counters.traversal_steps;
         if (node.is_leaf()) {
             ++counters.leaf_visits;

@@ -92,7 +92,7 @@ Hit trace_single(const KdTree &tree, const Ray &ray, Query query, const Entry &e
             visit = interval.near <= scaled.parameter(best.t);
             continue;
         }
-        const KdNode node = tree.nodes[node_index];
+        const KdNode node = tree.node(node_index);
         ++counters.traversal_steps;
         if (node.is_leaf()) {
             ++counters.leaf_visits;

@@ -1,0 +1,50 @@
+#include "kdtree/binned_method.h"
+
+namespace mlrt {
+
+std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
+                                  std::span<const Triangle> triangles,
+                                  const BuildOptions &options, Threads threads) {
+    const bool few = references.count() <= MAX_FEW_REFERENCES;
+    std::optional<Bins> bins;
+    if (!few)
+        bins.emplace(references, cell, threads);
+    if (options.rule_flat_cell) {
+        std::optional<Candidate> flat;
+        for (const PlanarGroup &group :
+             few ? planar_groups_of_few(references, cell) : bins->planar_groups())
+            if (covers(group, cell, triangles)) {
+                const Candidate candidate = flat_cell(group, cell, options);
+                if (!flat || is_cheaper(candidate.cost, flat->cost))
+                    flat = candidate;
+            }
+        if (flat)
+            return Choice{*flat, true};
+    }
+    const std::optional<Candidate> best =
+        few ? best_plane_of_few(references, cell, options) : bins->best_plane(options);
+    if (!best)
+        return std::nullopt;
+    return Choice{*best, false};
+}
+
+BinnedMethod::BinnedMethod(std::span<const Triangle> triangles, const BuildOptions &options,
+                           const Interruption &interruption, uint64_t max_references)
+    : triangles_(triangles), options_(options), interruption_(interruption),
+      partitioner_(triangles, options.clip),
+      // No child has more references than its parent, and at most two children a level
+      // are on the stack, in twice the room of the parent's at most.
+      stack_(0, 2 * uint64_t(MAX_TREE_DEPTH) * std::max<uint64_t>(max_references, 1)) {}
+
+BinnedMethod::Parts BinnedMethod::split(Contents contents, const Box3f &cell,
+                                        const SplitPlane &plane, bool) {
+    contents.stack_before = stack_.size();
+    const Halves halves =
+        partitioner_.split(contents, cell, plane, stack_.data() + stack_.size());
+    const uint64_t top =
+        uint64_t(halves.upper.list.data() + halves.upper.count() - stack_.data());
+    stack_.set_size(top);
+    return {contents, {halves.lower}, {halves.upper}};
+}
+
+} // namespace mlrt

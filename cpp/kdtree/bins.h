@@ -1,0 +1,77 @@
+// The planes of a cell that are worth a look, found without sorting: the bounds of all
+// references are counted in bins along each axis (min-max binning, Shevtsov et al. 2007),
+// and what lies in the bins that promise most is swept plane by plane.
+#pragma once
+
+#include "base/simd.h"
+#include "kdtree/chunks.h"
+#include "kdtree/rules.h"
+#include "kdtree/sweep.h"
+
+#include <array>
+#include <optional>
+#include <vector>
+
+namespace mlrt {
+
+// Numbers the bins, which are of equal width along each axis of a cell. Monotone: what is
+// not below has no lower number, so the count of what begins in front of a bin is exact.
+class BinGrid {
+public:
+    BinGrid(const Box3f &cell, int count);
+
+    int index(int axis, float position) const {
+        return int(
+            minimum(maximum((position - origin_[axis]) * scale_[axis], 0.0f), last_));
+    }
+
+    // Along all axes at once.
+    std::array<int32_t, 4> indices(const PointPacket &point) const {
+        const PointPacket bins =
+            (point - load<PointPacket>(origin_)) * load<PointPacket>(scale_);
+        std::array<int32_t, 4> result;
+        store(result.data(),
+              PointIndices(minimum(maximum(bins, PointPacket(0.0f)), PointPacket(last_))));
+        return result;
+    }
+
+private:
+    float origin_[4], scale_[4] = {};
+    float last_;
+};
+
+class Bins {
+public:
+    // Counts `references`, which lie in `cell`.
+    Bins(const References &references, const Box3f &cell, Threads threads);
+
+    // The cheapest plane found strictly inside the cell.
+    std::optional<Candidate> best_plane(const BuildOptions &options) const;
+
+    // Groups of references in one plane whose bounds are large enough to cover the cell.
+    std::vector<PlanarGroup> planar_groups() const;
+
+    static constexpr int MAX_BINS = 128;
+
+    // How many bounds begin and end in each bin, and the area across the axis of what is
+    // flat and lies in it.
+    struct Counts {
+        std::array<std::array<uint32_t, MAX_BINS>, 3> begin{}, end{};
+        std::array<std::array<double, MAX_BINS>, 3> flat_area{};
+        bool any_flat = false;
+    };
+
+private:
+    void count_range(uint64_t first, uint64_t last, Counts &counts) const;
+    // Events of the references in a bin, sorted.
+    std::vector<Event> events_within(int axis, int bin) const;
+
+    const References &references_;
+    const Box3f &cell_;
+    Threads threads_;
+    int bin_count_;
+    BinGrid grid_;
+    Counts counts_;
+};
+
+} // namespace mlrt

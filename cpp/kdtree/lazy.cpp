@@ -1,0 +1,221 @@
+#include "kdtree/lazy.h"
+
+#include "base/parallel.h"
+#include "base/simd.h"
+#include "kdtree/relocate.h"
+#include "kdtree/top.h"
+
+#include <algorithm>
+#include <chrono>
+
+namespace mlrt {
+
+namespace {
+
+// Cells of more references are split before the first ray comes, by all threads together:
+// any ray enters one of the few, and others would wait for it.
+constexpr uint64_t MAX_TOP_REFERENCES = 262144;
+
+// Cells of up to this many references are built at once: the time to split them step by
+// step would exceed what is saved. Chosen by measurement.
+constexpr uint64_t MAX_WHOLE_REFERENCES = 64;
+
+// Room that is reserved for nodes, in proportion to that for references; memory is taken
+// when it is used.
+constexpr uint64_t NODES_PER_REFERENCE = 8;
+
+} // namespace
+
+LazyGrowth::LazyGrowth(KdTree &tree, const BuildFrame &frame, uint64_t max_cell_references)
+    : options_(frame.options), frame_{options_, frame.scene_area, frame.area_floor},
+      triangles_(tree.triangles.begin(), tree.triangles.end()), nodes_(tree.nodes.data()),
+      references_(tree.references.data()), max_nodes_(tree.nodes.capacity()),
+      max_references_(tree.references.capacity()),
+      max_cell_references_(max_cell_references), node_count_(tree.nodes.size()),
+      reference_count_(tree.references.size()), seeds_(0, max_nodes_) {}
+
+LazyGrowth::~LazyGrowth() {
+    for (uint32_t i = 0; i < seed_count_; ++i)
+        delete seeds_[i];
+}
+
+KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
+                         const References &contents) {
+    const uint64_t count = contents.count();
+    if (count == 0)
+        return KdNode::leaf(0, 0);
+    auto seed = std::make_unique<Seed>();
+    seed->cell = cell;
+    seed->allowance = allowance;
+    seed->bounds = contents.bounds;
+    seed->count = uint32_t(count);
+    seed->list = std::make_unique_for_overwrite<Reference[]>(count);
+    std::copy(contents.list.begin(), contents.list.end(), seed->list.get());
+    const uint32_t number = seed_count_.fetch_add(1);
+    seeds_[number] = seed.release();
+    unbuilt_cells_.fetch_add(1, std::memory_order_relaxed);
+    unbuilt_references_.fetch_add(count, std::memory_order_relaxed);
+    return KdNode::unbuilt(number, count);
+}
+
+uint64_t LazyGrowth::take_nodes(uint64_t count) {
+    const uint64_t first = node_count_.fetch_add(count);
+    if (first + count > max_nodes_)
+        check_tree_size(KdNode::MAX_NODES + 1, 0);
+    return first;
+}
+
+uint64_t LazyGrowth::take_references(uint64_t count) {
+    const uint64_t first = reference_count_.fetch_add(count);
+    if (first + count > max_references_)
+        check_tree_size(0, uint64_t(1) << 32);
+    return first;
+}
+
+KdNode LazyGrowth::build(uint32_t index, bool whole) {
+    const KdNode node = load_node(nodes_[index]);
+    if (!node.is_unbuilt())
+        return node;
+    Seed &seed = *seeds_[node.number()];
+    if (seed.claimed.exchange(true)) {
+        seed.finished.wait(false);
+        if (seed.error)
+            std::rethrow_exception(seed.error);
+        return load_node(nodes_[index]);
+    }
+    try {
+        const KeepDenormals keep_denormals;
+        publish_node(nodes_[index], grown(seed, whole));
+        seed.list.reset();
+        unbuilt_cells_.fetch_sub(1, std::memory_order_relaxed);
+        unbuilt_references_.fetch_sub(seed.count, std::memory_order_relaxed);
+    } catch (...) {
+        seed.error = std::current_exception();
+    }
+    seed.finished.store(true);
+    seed.finished.notify_all();
+    if (seed.error)
+        std::rethrow_exception(seed.error);
+    return load_node(nodes_[index]);
+}
+
+KdNode LazyGrowth::grown(Seed &seed, bool whole) {
+    if (seed.count > max_cell_references_) {
+        BinnedMethod method(triangles_, options_, interruption_, seed.count);
+        SubtreeArrays arrays;
+        return whole_subtree(seed, method, arrays);
+    }
+    std::unique_ptr<Workspace> workspace = take_workspace();
+    BinnedMethod &method = workspace->method;
+    KdNode node;
+    const BinnedMethod::Contents contents{seed.references()};
+    Decision decision;
+    whole = whole || seed.count <= MAX_WHOLE_REFERENCES;
+    if (!whole)
+        decision = decide(method, contents, seed.cell, seed.allowance, frame_);
+    if (whole || decision.kind == Decision::Kind::leaf || decision.bad) {
+        node = whole_subtree(seed, method, workspace->arrays);
+    } else {
+        const auto [axis, position, planar_below] = decision.plane;
+        const Box3f lower_cell = lower_part(seed.cell, axis, position);
+        const Box3f upper_cell = upper_part(seed.cell, axis, position);
+        const uint64_t children = take_nodes(2);
+        if (decision.kind == Decision::Kind::empty_cell) {
+            const Box3f &full_cell = planar_below ? lower_cell : upper_cell;
+            const KdNode full = plant(full_cell, decision.rest, contents);
+            nodes_[children] = planar_below ? full : KdNode::leaf(0, 0);
+            nodes_[children + 1] = planar_below ? KdNode::leaf(0, 0) : full;
+        } else {
+            BinnedMethod::Parts parts =
+                method.split(contents, seed.cell, decision.plane, false);
+            nodes_[children] = plant(lower_cell, decision.rest, parts.lower);
+            nodes_[children + 1] = plant(upper_cell, decision.rest, parts.upper);
+            method.give_back(parts.kept);
+        }
+        node = KdNode::inner(axis, position, uint32_t(children));
+    }
+    give_back(std::move(workspace));
+    return node;
+}
+
+KdNode LazyGrowth::whole_subtree(const Seed &seed, BinnedMethod &method,
+                                 SubtreeArrays &arrays) {
+    arrays.nodes.assign(1, {});
+    arrays.references.clear();
+    BuildReport report;
+    SubtreeBuilder(method, frame_)
+        .build(arrays, report, 0, seed.cell, {seed.references()}, seed.allowance);
+    const uint64_t first_node = take_nodes(arrays.nodes.size() - 1);
+    const uint64_t first_reference = take_references(arrays.references.size());
+    return relocate(arrays, first_node, first_reference, nodes_, references_);
+}
+
+std::unique_ptr<LazyGrowth::Workspace> LazyGrowth::take_workspace() {
+    {
+        const std::lock_guard lock(workspaces_mutex_);
+        if (!workspaces_.empty()) {
+            auto workspace = std::move(workspaces_.back());
+            workspaces_.pop_back();
+            return workspace;
+        }
+    }
+    return std::make_unique<Workspace>(Workspace{
+        BinnedMethod(triangles_, options_, interruption_, max_cell_references_), {}});
+}
+
+void LazyGrowth::give_back(std::unique_ptr<Workspace> workspace) {
+    const std::lock_guard lock(workspaces_mutex_);
+    workspaces_.push_back(std::move(workspace));
+}
+
+void LazyGrowth::finish() {
+    // Nodes that are added meanwhile are finished ones.
+    const uint64_t count = node_count_.load();
+    for_each_chunk(count, Threads::all, [&](uint32_t, uint64_t first, uint64_t last) {
+        for (uint64_t i = first; i < last; ++i)
+            if (load_node(nodes_[i]).is_unbuilt())
+                build(uint32_t(i), true);
+    });
+}
+
+GrowthState LazyGrowth::state() const {
+    return {node_count_.load(), reference_count_.load(), unbuilt_cells_.load(),
+            unbuilt_references_.load(), unbuilt_references_.load() * sizeof(Reference)};
+}
+
+KdNode KdTree::built_node(uint32_t index) const {
+    return growth->build(index, false);
+}
+
+void finish_growth(const KdTree &tree) {
+    if (tree.growth)
+        tree.growth->finish();
+}
+
+void build_lazy(KdTree &tree, BuildReport &report, HugeArray<Reference> references,
+                const BuildFrame &frame, const Interruption &interruption) {
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point start = Clock::now();
+    const uint64_t count = references.size();
+    Top top = build_top(
+        std::move(references), tree.bounds, {tree.triangles.begin(), tree.triangles.end()},
+        whole_allowance(frame.options, count), frame, MAX_TOP_REFERENCES, interruption);
+    report.add(top.report);
+
+    const uint64_t max_references =
+        std::min<uint64_t>(max_references_of(count), std::numeric_limits<uint32_t>::max());
+    tree.references = HugeArray<uint32_t>(0, max_references);
+    tree.nodes = HugeArray<KdNode>(
+        top.nodes.size(),
+        std::min<uint64_t>(KdNode::MAX_NODES, NODES_PER_REFERENCE * max_references));
+    std::copy(top.nodes.begin(), top.nodes.end(), tree.nodes.begin());
+    tree.growth = std::make_shared<LazyGrowth>(tree, frame, MAX_TOP_REFERENCES);
+    for (Remainder &part : top.remainders) {
+        tree.nodes[part.node] =
+            tree.growth->plant(part.cell, part.allowance, part.references());
+        part.list = {};
+    }
+    report.seconds_top = std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+} // namespace mlrt

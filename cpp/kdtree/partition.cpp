@@ -1,0 +1,137 @@
+#include "kdtree/partition.h"
+
+#include "geometry/clip.h"
+#include "kdtree/sah.h"
+
+#include <cstring>
+#include <vector>
+
+namespace mlrt {
+
+namespace {
+
+// Both parts of a reference that a plane cuts; a part may be empty.
+struct CutReference {
+    Box3f lower, upper;
+};
+
+// Appends to lists with room enough. `on_cut` gives the two parts of what is cut.
+struct Writer {
+    Reference *lower, *upper;
+    Box3f lower_bounds, upper_bounds;
+
+    template <typename OnCut>
+    void distribute(std::span<const Reference> list, const SplitPlane &plane,
+                    OnCut &&on_cut) {
+        const auto [axis, position, planar_below] = plane;
+        for (const Reference &reference : list) {
+            const bool below = reference.bounds.lo[axis] < position;
+            const bool above = reference.bounds.hi[axis] > position;
+            if (below && above) {
+                const CutReference parts = on_cut(reference);
+                if (!parts.lower.empty()) {
+                    *lower++ = {parts.lower, reference.triangle};
+                    add_bounds(lower_bounds, parts.lower);
+                }
+                if (!parts.upper.empty()) {
+                    *upper++ = {parts.upper, reference.triangle};
+                    add_bounds(upper_bounds, parts.upper);
+                }
+            } else if (above || (!below && !planar_below)) {
+                *upper++ = reference;
+                add_bounds(upper_bounds, reference.bounds);
+            } else {
+                *lower++ = reference;
+                add_bounds(lower_bounds, reference.bounds);
+            }
+        }
+    }
+};
+
+} // namespace
+
+Box3f Partitioner::part_in(const Reference &reference, const Box3f &child) const {
+    Box3f part = clip_ ? clip_triangle(triangles_[reference.triangle], child) : child;
+    // Also within what was known before: bounds only ever shrink.
+    for (int k = 0; k < 3; ++k) {
+        part.lo[k] = std::max(part.lo[k], reference.bounds.lo[k]);
+        part.hi[k] = std::min(part.hi[k], reference.bounds.hi[k]);
+    }
+    return part.empty() ? Box3f{} : part;
+}
+
+Halves Partitioner::split(const References &references, const Box3f &cell,
+                          const SplitPlane &plane, Reference *room) const {
+    const Box3f lower_cell = lower_part(cell, plane.axis, plane.position);
+    const Box3f upper_cell = upper_part(cell, plane.axis, plane.position);
+    Reference *const upper_room = room + references.count();
+    Writer writer{room, upper_room, {}, {}};
+    writer.distribute(references.list, plane, [&](const Reference &reference) {
+        return CutReference{part_in(reference, lower_cell), part_in(reference, upper_cell)};
+    });
+    return {{{room, writer.lower}, writer.lower_bounds},
+            {{upper_room, writer.upper}, writer.upper_bounds}};
+}
+
+Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &references,
+                                                           const Box3f &cell,
+                                                           const SplitPlane &plane) const {
+    const auto [axis, position, planar_below] = plane;
+    const Box3f lower_cell = lower_part(cell, axis, position);
+    const Box3f upper_cell = upper_part(cell, axis, position);
+    struct Part {
+        uint64_t lower_count = 0, upper_count = 0;
+        std::vector<CutReference> cut;
+        Box3f lower_bounds, upper_bounds;
+    };
+    const uint64_t count = references.count();
+    std::vector<Part> parts(chunk_count(count));
+
+    // First count, so that each chunk knows where it writes.
+    for_each_chunk(count, Threads::all, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+        Part &part = parts[chunk];
+        for (const Reference &reference : references.list.subspan(first, last - first)) {
+            const bool below = reference.bounds.lo[axis] < position;
+            const bool above = reference.bounds.hi[axis] > position;
+            if (below && above) {
+                const CutReference cut{part_in(reference, lower_cell),
+                                       part_in(reference, upper_cell)};
+                part.lower_count += !cut.lower.empty();
+                part.upper_count += !cut.upper.empty();
+                part.cut.push_back(cut);
+            } else {
+                const bool to_upper = above || (!below && !planar_below);
+                part.lower_count += !to_upper;
+                part.upper_count += to_upper;
+            }
+        }
+    });
+    uint64_t lower_count = 0, upper_count = 0;
+    std::vector<std::pair<uint64_t, uint64_t>> starts;
+    for (const Part &part : parts) {
+        starts.emplace_back(lower_count, upper_count);
+        lower_count += part.lower_count;
+        upper_count += part.upper_count;
+    }
+    OwnHalves halves{
+        HugeArray<Reference>(lower_count), HugeArray<Reference>(upper_count), {}, {}};
+    for_each_chunk(count, Threads::all, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+        Part &part = parts[chunk];
+        Writer writer{halves.lower.data() + starts[chunk].first,
+                      halves.upper.data() + starts[chunk].second,
+                      {},
+                      {}};
+        auto next_cut = part.cut.begin();
+        writer.distribute(references.list.subspan(first, last - first), plane,
+                          [&](const Reference &) { return *next_cut++; });
+        part.lower_bounds = writer.lower_bounds;
+        part.upper_bounds = writer.upper_bounds;
+    });
+    for (const Part &part : parts) {
+        add_bounds(halves.lower_bounds, part.lower_bounds);
+        add_bounds(halves.upper_bounds, part.upper_bounds);
+    }
+    return halves;
+}
+
+} // namespace mlrt

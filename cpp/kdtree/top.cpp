@@ -1,0 +1,85 @@
+#include "kdtree/top.h"
+
+#include "kdtree/binned_method.h"
+
+namespace mlrt {
+
+namespace {
+
+// The fast method with all threads at once, as far as `decide` needs it.
+struct TopMethod {
+    using Contents = References;
+
+    std::span<const Triangle> triangles;
+    const BuildOptions &options;
+
+    std::optional<SplitPlane> largest_empty_part(const References &contents,
+                                                 const Box3f &cell) const {
+        return mlrt::largest_empty_part(contents.bounds, cell, options);
+    }
+    std::optional<Choice> choose(const References &contents, const Box3f &cell) const {
+        return choose_fast(contents, cell, triangles, options, Threads::all);
+    }
+};
+
+} // namespace
+
+Top build_top(HugeArray<Reference> references, const Box3f &bounds,
+              std::span<const Triangle> triangles, const Allowance &allowance,
+              const BuildFrame &frame, uint64_t max_references,
+              const Interruption &interruption) {
+    TopMethod method{triangles, frame.options};
+    const Partitioner partitioner(triangles, frame.options.clip);
+    Top top;
+    top.cells.push_back(bounds);
+    std::vector<Remainder> pending;
+    pending.push_back({0, bounds, allowance, std::move(references), bounds});
+    const auto add_node = [&](const Box3f &cell) {
+        top.nodes.push_back({});
+        top.cells.push_back(cell);
+        return uint32_t(top.nodes.size() - 1);
+    };
+    while (!pending.empty()) {
+        interruption.check();
+        Remainder current = std::move(pending.back());
+        pending.pop_back();
+        Decision decision;
+        if (current.list.size() > max_references)
+            decision = decide(method, current.references(), current.cell, current.allowance,
+                              frame);
+        // What ends here for good, and what may be taken back, is left to who builds
+        // subtrees.
+        if (decision.kind == Decision::Kind::leaf || decision.bad) {
+            top.nodes[current.node] = KdNode::leaf(0, 0);
+            top.remainders.push_back(std::move(current));
+            continue;
+        }
+        const auto [axis, position, planar_below] = decision.plane;
+        const Box3f lower_cell = lower_part(current.cell, axis, position);
+        const Box3f upper_cell = upper_part(current.cell, axis, position);
+        const uint32_t lower = add_node(lower_cell), upper = add_node(upper_cell);
+        top.nodes[current.node] = KdNode::inner(axis, position, lower);
+        ++top.report.inner_nodes;
+        if (decision.kind == Decision::Kind::empty_cell) {
+            ++top.report.empty_cell_splits;
+            ++top.report.leaves;
+            ++top.report.empty_leaves;
+            top.nodes[planar_below ? upper : lower] = KdNode::leaf(0, 0);
+            pending.push_back({planar_below ? lower : upper,
+                               planar_below ? lower_cell : upper_cell, decision.rest,
+                               std::move(current.list), current.bounds});
+            continue;
+        }
+        top.report.flat_cell_splits += decision.flat;
+        Partitioner::OwnHalves halves = partitioner.split_with_all_threads(
+            current.references(), current.cell, decision.plane);
+        // The lower one is taken first.
+        pending.push_back({upper, upper_cell, decision.rest, std::move(halves.upper),
+                           halves.upper_bounds});
+        pending.push_back({lower, lower_cell, decision.rest, std::move(halves.lower),
+                           halves.lower_bounds});
+    }
+    return top;
+}
+
+} // namespace mlrt
