@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._dispatch import core
+from .errors import MlrtWarning
 from .options import BUILD_OPTIONS, TRACE_OPTIONS
 from .tree_files import load_tree, save_tree
 from .tree_report import tree_report
@@ -49,12 +51,24 @@ class KdTree:
         faces: (F, 3) integers, numbers of vertices.
         options: fields of `BuildOptions`, see `mlrt_plugin.options.BUILD_OPTIONS`.
 
-        Raises ValueError for arrays of another shape or type, and for a face that refers
-        to a vertex that does not exist; TypeError for an unknown option.
+        Warns of faces with a vertex that is not finite as MlrtWarning. Raises ValueError
+        for arrays of another shape or type, and for a face that refers to a vertex that
+        does not exist; TypeError for an unknown option.
         """
         points = triples(vertices, "vertices")
         corners = indices(faces, len(points))
         self._tree = core.KdTree(points, corners, **build_options(options))
+        if self._tree.report["dropped_triangles"]:
+            bad = ~np.isfinite(points).all(axis=1)
+            dropped = np.flatnonzero(bad[corners].any(axis=1))
+            if dropped.size:
+                warnings.warn(
+                    f"{dropped.size} of {len(corners)} faces have vertices with NaN or "
+                    "infinite coordinates in single precision and are left out, first of "
+                    f"them face {dropped[0]}, of vertices {corners[dropped[0]].tolist()}",
+                    MlrtWarning,
+                    stacklevel=2,
+                )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the tree to a file, from which `load` gets it back; its faces are not

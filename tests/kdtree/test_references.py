@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
-from kd_trees import BuiltTree
+from kd_trees import BUILDERS, BuiltTree, each_builder
 
 SEED = 20260106
 FloatArray = npt.NDArray[np.float32]
@@ -72,10 +72,14 @@ SWITCHES: list[dict[str, Any]] = [
 ]
 
 
+@each_builder
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("options", SWITCHES, ids=lambda o: "-".join(o) or "default")
-def test_no_point_of_a_triangle_is_lost(scene: str, options: dict[str, Any]) -> None:
-    tree = BuiltTree(SCENES[scene](np.random.default_rng(SEED)), **options)
+def test_no_point_of_a_triangle_is_lost(
+    builder: str, scene: str, options: dict[str, Any]
+) -> None:
+    triangles = SCENES[scene](np.random.default_rng(SEED))
+    tree = BuiltTree(triangles, **BUILDERS[builder], **options)
     dropped = 0
     for i, triangle in enumerate(tree.triangles):
         if i not in tree.references:
@@ -89,11 +93,12 @@ def test_no_point_of_a_triangle_is_lost(scene: str, options: dict[str, Any]) -> 
     assert dropped == tree.report["dropped_triangles"]
 
 
+@each_builder
 @pytest.mark.parametrize(
     "scene", ["soup", "lattice", "lattice far out", "sphere", "stairs"]
 )
-def test_no_leaf_holds_what_it_does_not_touch(scene: str) -> None:
-    tree = BuiltTree(SCENES[scene](np.random.default_rng(SEED)))
+def test_no_leaf_holds_what_it_does_not_touch(builder: str, scene: str) -> None:
+    tree = BuiltTree(SCENES[scene](np.random.default_rng(SEED)), **BUILDERS[builder])
     for visit in tree.walk():
         if tree.is_leaf(visit.node):
             for i in tree.referenced(visit.node):
@@ -102,9 +107,10 @@ def test_no_leaf_holds_what_it_does_not_touch(scene: str) -> None:
                 assert part, f"seed {SEED}: triangle {i} in leaf {visit.node}"
 
 
+@each_builder
 @pytest.mark.parametrize("scene", SCENES)
-def test_bounds_are_those_of_the_references(scene: str) -> None:
-    tree = BuiltTree(SCENES[scene](np.random.default_rng(SEED)))
+def test_bounds_are_those_of_the_references(builder: str, scene: str) -> None:
+    tree = BuiltTree(SCENES[scene](np.random.default_rng(SEED)), **BUILDERS[builder])
     used = tree.triangles[np.unique(tree.references)].reshape(-1, 3)
     assert (tree.lo == used.min(0)).all()
     assert (tree.hi == used.max(0)).all()
