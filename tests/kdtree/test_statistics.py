@@ -11,7 +11,7 @@ import pytest
 import workloads
 from kd_trees import BuiltTree
 
-from mlrt_plugin import KdTree
+from mlrt_plugin import KdTree, MlrtWarning
 from mlrt_plugin._dispatch import core
 
 SEED = 20261124
@@ -108,6 +108,7 @@ def test_dropped_triangles_are_numbered() -> None:
     vertices[faces[4, 1], 2] = np.nan
     vertices[faces[11, 0]] = np.inf
     faces[20, 2] = faces[20, 0]
-    tree = KdTree(vertices, faces)
+    with pytest.warns(MlrtWarning, match="2 of 30 faces"):
+        tree = KdTree(vertices, faces)
     assert tree.report["dropped_triangles"] == 3
     assert core.tree_dropped(tree._tree).tolist() == [4, 11, 20]
