@@ -1,7 +1,9 @@
 // The triangles that both engines are given.
 #pragma once
 
+#include "base/huge_array.h"
 #include "geometry/triangle.h"
+#include "kdtree/chunks.h"
 
 #include <array>
 #include <cstdint>
@@ -17,11 +19,15 @@ struct Mesh {
 
     size_t vertex_count() const { return vertices.size() - 1; }
 
-    std::vector<Triangle> triangles() const {
-        std::vector<Triangle> result(faces.size());
-        for (size_t i = 0; i < faces.size(); ++i)
-            result[i] = {vertices[faces[i][0]], vertices[faces[i][1]],
-                         vertices[faces[i][2]]};
+    // As the plugin makes them of its arrays.
+    HugeArray<Triangle> triangles() const {
+        HugeArray<Triangle> result(faces.size());
+        for_each_chunk(faces.size(), Threads::all,
+                       [&](uint32_t, uint64_t first, uint64_t last) {
+                           for (uint64_t i = first; i < last; ++i)
+                               result[i] = {vertices[faces[i][0]], vertices[faces[i][1]],
+                                            vertices[faces[i][2]]};
+                       });
         return result;
     }
 };

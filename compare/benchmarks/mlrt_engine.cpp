@@ -141,11 +141,19 @@ uint32_t tile_side(const TraceOptions &options) {
 
 } // namespace
 
+GrowthState TimedTree::state() const {
+    if (built.tree.growth)
+        return built.tree.growth->state();
+    GrowthState state;
+    state.nodes = built.tree.nodes.size();
+    state.references = built.tree.references.size();
+    return state;
+}
+
 uint64_t TimedTree::bytes() const {
-    const KdTree &tree = built.tree;
-    return tree.nodes.size() * sizeof(tree.nodes[0]) +
-           tree.references.size() * sizeof(tree.references[0]) +
-           tree.triangles.size() * sizeof(tree.triangles[0]);
+    const GrowthState now = state();
+    return now.nodes * sizeof(KdNode) + now.references * sizeof(uint32_t) +
+           built.tree.triangles.bytes() + now.waiting_bytes;
 }
 
 std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &options,

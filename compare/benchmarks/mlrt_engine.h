@@ -4,6 +4,7 @@
 #include "base/counters.h"
 #include "frame.h"
 #include "kdtree/builder.h"
+#include "kdtree/lazy.h"
 #include "mesh.h"
 #include "mlrta/trace.h"
 #include "stopwatch.h"
@@ -16,6 +17,8 @@ struct TimedTree {
     BuiltTree built;
     Seconds seconds; // from vertices and faces to the tree
 
+    // Nodes and references so far, and what a lazy tree keeps for later.
+    GrowthState state() const;
     uint64_t bytes() const;
 };
 

@@ -7,8 +7,6 @@
 #include "mlrt_engine.h"
 #include "render/camera.h"
 
-#include <algorithm>
-#include <iterator>
 #include <malloc.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
@@ -71,17 +69,8 @@ FrameOutput output_from(const View &view, const Image &image,
     return {image.data(), primitives ? primitives->data() : nullptr};
 }
 
-// Names of builders that a tree can be asked for.
-constexpr const char *BUILDERS[] = {"exact"};
-
-BuildOptions options_for(const std::string &builder) {
-    if (std::find(std::begin(BUILDERS), std::end(BUILDERS), builder) == std::end(BUILDERS))
-        refuse_value("there is no builder '" + builder + "'.");
-    return {};
-}
-
-TimedTree built_tree(const Mesh &mesh, const std::string &builder) {
-    const BuildOptions options = options_for(builder);
+TimedTree built_tree(const Mesh &mesh, const nb::dict &options_dict) {
+    const BuildOptions options = build_options_from(options_dict);
     Watch watch;
     std::optional<TimedTree> tree;
     {
@@ -114,12 +103,26 @@ void bind_mlrt(nb::module_ &m) {
     nb::class_<TimedTree>(m, "KdTree")
         .def(
             "__init__",
-            [](TimedTree *self, const Mesh &mesh, const std::string &builder) {
-                new (self) TimedTree(built_tree(mesh, builder));
+            [](TimedTree *self, const Mesh &mesh, const nb::dict &options) {
+                new (self) TimedTree(built_tree(mesh, options));
             },
-            nb::arg("mesh"), nb::arg("builder"))
+            nb::arg("mesh"), nb::arg("options"))
         .def_prop_ro("seconds", [](const TimedTree &self) { return self.seconds; })
         .def_prop_ro("bytes", &TimedTree::bytes)
+        .def_prop_ro("state",
+                     [](const TimedTree &self) {
+                         const GrowthState state = self.state();
+                         nb::dict dict;
+                         dict["nodes"] = state.nodes;
+                         dict["references"] = state.references;
+                         dict["unbuilt_cells"] = state.unbuilt_cells;
+                         dict["unbuilt_references"] = state.unbuilt_references;
+                         dict["waiting_bytes"] = state.waiting_bytes;
+                         return dict;
+                     })
+        .def(
+            "finish", [](const TimedTree &self) { finish_growth(self.built.tree); },
+            nb::call_guard<nb::gil_scoped_release>(), "Builds what is not built yet.")
         .def(
             "sah_cost", [](const TimedTree &self) { return sah_cost(self.built.tree); },
             "Found by walking the tree, in units of a traversal step.")
@@ -188,10 +191,6 @@ void bind_embree(nb::module_ &m) {
 NB_MODULE(MLRT_MODULE, m) {
     using namespace mlrt::bench;
     m.attr("isa") = MLRT_ISA_NAME;
-    nb::list builders;
-    for (const char *name : BUILDERS)
-        builders.append(name);
-    m.attr("builders") = builders;
     m.def(
         "release_memory", [] { malloc_trim(0); },
         "Returns freed memory to the system, so that the next piece of work starts as in "

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from mlrt_plugin.threads import thread_count
 
-from .contenders import EMBREE, MLRT, Contender, contenders_of, embree_device
+from .contenders import EMBREE, MLRT, WARM_UP_FACES, Contender, contenders_of, embree_device
 from .goals import goals_of
 from .measure import Run, in_turns, timed
 from .native import Native
@@ -22,7 +22,6 @@ from .scenes import BenchScene
 
 ROUNDS_A_REPEAT = 3
 """Runs that others disturb do not count and are repeated, within this limit; chosen."""
-WARM_UP_FACES = 2000
 BACKGROUND = 0xFFFFFFFF
 LARGEST_DIFFERENCE = 1e-3
 """Of the brightness of a pixel that two engines agree on."""
@@ -61,6 +60,7 @@ class SceneBenchmark:
         self.frames: dict[str, Frame] = {}
         self._ats: dict[str, dict[str, float]] = {}
         self._sah_costs: dict[str, float] = {}
+        self._growth: dict[str, float] = {}
         self._peaks: dict[str, int | None] = {}
 
     def blocks(self) -> Iterator[dict[str, Any]]:
@@ -70,11 +70,12 @@ class SceneBenchmark:
                 yield self._block(threads)
 
     def summary(self) -> dict[str, Any]:
-        """What does not depend on the number of threads: peak memory, cost, traversal
-        steps, agreement."""
+        """What does not depend on the number of threads: peak memory, cost, share that
+        is built, traversal steps, agreement."""
         return {
             "resident_peak_bytes": self._peaks,
             "sah_cost": self._sah_costs,
+            "built_share": self._growth,
             "ats": self._ats,
             "agreement": agreement(self.frames),
         }
@@ -89,8 +90,12 @@ class SceneBenchmark:
             del built
         runs = [partial(self._run, contender, threads) for contender in contenders]
         if not self._peaks:
-            names = [contender.name for contender in contenders]
-            self._peaks = resident_peaks(self._native.library, self._scene, names, threads)
+            self._peaks = resident_peaks(
+                self._native.library,
+                self._scene,
+                [contender.name for contender in contenders],
+                max(self._settings.threads),
+            )
         for which, run in in_turns(runs, ROUNDS_A_REPEAT * self._settings.repeats):
             contenders[which].runs.append(run)
         block = {
@@ -108,7 +113,9 @@ class SceneBenchmark:
                 for contender in contenders
             ],
         }
-        block["goals"] = [goal.as_dict() for goal in goals_of(block, self._sah_costs)]
+        block["goals"] = [
+            goal.as_dict() for goal in goals_of(self._scene.name, block, self._sah_costs)
+        ]
         return block
 
     def _run(self, contender: Contender, threads: int) -> Run | None:
@@ -125,7 +132,7 @@ class SceneBenchmark:
         )
         contender.facts = {"bytes": int(built.bytes)}
         if contender.engine == MLRT:
-            contender.facts["report"] = dict(built.report)
+            contender.facts |= {"state": dict(built.state), "report": dict(built.report)}
         else:
             contender.facts["peak_bytes"] = int(built.peak_bytes)
         if contender.name not in self.frames:
@@ -136,7 +143,11 @@ class SceneBenchmark:
         primitives = np.zeros(self._image.shape, np.uint32)
         contender.render(built, self._view, self._image, primitives)
         self.frames[contender.name] = Frame(self._image.copy(), primitives)
-        if contender.engine == MLRT and contender.kind != "lazy":
+        if contender.engine != MLRT:
+            return
+        if contender.kind == "lazy":
+            self._growth = growth(built)
+        else:
             self._sah_costs[contender.name] = float(built.sah_cost())
             self._ats[contender.name] = {
                 "with_entry_points": self._steps(built, True),
@@ -151,6 +162,14 @@ class SceneBenchmark:
         )
         steps = counted["entry_steps"] + counted["traversal_steps"]
         return 16 * float(steps) / self._image.size
+
+
+def growth(tree: Any) -> dict[str, float]:
+    """The shares of a lazy tree's nodes and references that are built; builds the rest."""
+    now = dict(tree.state)
+    tree.finish()
+    whole = dict(tree.state)
+    return {key: now[key] / max(whole[key], 1) for key in ("nodes", "references")}
 
 
 def agreement(frames: dict[str, Frame]) -> dict[str, Any]:

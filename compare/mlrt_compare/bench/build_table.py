@@ -66,14 +66,12 @@ def scene_lines(scene: dict[str, Any]) -> list[str]:
     ]
     if not agreement["mlrt_trees_give_one_image"]:
         lines.append("  MLRT's trees do NOT give one image: this is a defect")
-    for block in scene["blocks"]:
-        for contender in block["contenders"]:
-            share = contender.get("report", {}).get("built_share")
-            if contender["name"] == "MLRT lazy" and share is not None:
-                lines.append(
-                    f"  lazy, {plural(block['threads'])}: {100 * share:.1f} % of the tree "
-                    "was built after the frame"
-                )
+    share = scene["built_share"]
+    if share:
+        lines.append(
+            f"  lazy: after the frame {100 * share['nodes']:.1f} % of the nodes and "
+            f"{100 * share['references']:.1f} % of the references of the tree are built"
+        )
     return lines
 
 

@@ -10,6 +10,9 @@ from typing import Any
 from .measure import Run
 
 MLRT, EMBREE = "MLRT", "Embree"
+BUILDERS, QUALITIES = ("exact", "fast", "lazy"), ("MEDIUM", "HIGH")
+WARM_UP_FACES = 2000
+"""Of a scene, that each contender builds and renders before it is measured."""
 ENOUGH_SECONDS = 90.0
 """A contender whose runs took longer than that in all is not run again, once it has run
 twice; chosen, for the exact builder on millions of triangles."""
@@ -54,7 +57,7 @@ def contenders_of(module: ModuleType, device: Any) -> list[Contender]:
         return Contender(
             MLRT,
             builder,
-            lambda mesh: module.KdTree(mesh, builder),
+            lambda mesh: module.KdTree(mesh, {"builder": builder}),
             lambda tree, view, image, primitives: tree.render(view, {}, image, primitives),
         )
 
@@ -66,4 +69,4 @@ def contenders_of(module: ModuleType, device: Any) -> list[Contender]:
             lambda scene, view, image, primitives: scene.render(view, image, primitives),
         )
 
-    return [*map(mlrt, module.builders), *map(embree, ("MEDIUM", "HIGH"))]
+    return [*map(mlrt, BUILDERS), *map(embree, QUALITIES)]

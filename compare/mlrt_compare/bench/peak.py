@@ -1,4 +1,5 @@
-"""The most memory that a build takes, found by processes that do nothing else.
+"""The most memory that a build and the frame after it take, found by processes that do
+nothing else.
 
 In a process that has built before, freed memory that the system never got back would hide
 a part of it.
@@ -12,13 +13,17 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
+
 from mlrt_plugin.threads import thread_count
 
-from .contenders import contenders_of, embree_device
+from .contenders import WARM_UP_FACES, contenders_of, embree_device
 from .native import loaded
 from .scenes import BenchScene, read_stored, store
 
 OWN_PROCESS = Path("/proc/self")
+SIDE = 1024
+"""Pixels along both sides of the frame, as usual."""
 
 
 def resident_peaks(
@@ -41,19 +46,24 @@ def resident_peaks(
 
 
 def grown_bytes(library: Path, file: Path, name: str, threads: int) -> int | None:
-    """By how much the memory of this process grows at most while it builds."""
+    """By how much the memory of this process grows at most while it builds and renders."""
     module = loaded(library)
     scene = read_stored(file, "")
     mesh = module.Mesh(scene.vertices, scene.faces)
+    small_mesh = module.Mesh(scene.vertices, scene.faces[:WARM_UP_FACES])
+    view = module.View(scene.view, SIDE, SIDE)
+    image = np.zeros((SIDE, SIDE), np.float32)
     with thread_count(threads):
         device = embree_device(module, threads)
         contender = next(c for c in contenders_of(module, device) if c.name == name)
+        # What stays whatever is built: threads, code, buffers of rays.
+        contender.render(contender.build(small_mesh), view, image, None)
+        module.release_memory()
         if not forget_peak():
             return None
         before = resident_bytes("VmRSS")
-        built = contender.build(mesh)
+        contender.render(contender.build(mesh), view, image, None)
         peak = resident_bytes("VmHWM")
-        del built
     return max(peak - before, 0)
 
 
