@@ -59,7 +59,7 @@ class KdTree:
         corners = indices(faces, len(points))
         self._tree = core.KdTree(points, corners, **build_options(options))
         if self._tree.report["dropped_triangles"]:
-            bad = ~np.isfinite(points).all(axis=1)
+            bad: npt.NDArray[np.bool_] = np.any(~np.isfinite(points), axis=1)
             dropped = np.flatnonzero(bad[corners].any(axis=1))
             if dropped.size:
                 warnings.warn(
