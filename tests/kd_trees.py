@@ -15,7 +15,9 @@ from mlrt_plugin._dispatch import core
 FloatArray = npt.NDArray[np.float32]
 LEAF = 3
 
-BUILDERS: dict[str, dict[str, Any]] = {"exact": {}}
+BUILDERS: dict[str, dict[str, Any]] = {
+    name: {"builder": name} for name in ("exact", "fast", "lazy")
+}
 """Build options by the name of the builder that they choose."""
 
 each_builder = pytest.mark.parametrize("builder", BUILDERS)
@@ -37,7 +39,10 @@ class Visit:
 
 
 class BuiltTree:
-    """The tree that the core builds over triangles (N, 3, 3) with some build options."""
+    """The tree that the core builds over triangles (N, 3, 3) with some build options.
+
+    A lazy one is finished: no ray is needed.
+    """
 
     def __init__(self, triangles: npt.ArrayLike, **options: Any) -> None:
         self.triangles = np.ascontiguousarray(triangles, np.float32).reshape(-1, 3, 3)
@@ -61,6 +66,16 @@ class BuiltTree:
     def leaves(self) -> Iterator[Visit]:
         """Yields all leaves."""
         return (visit for visit in self.walk() if self.is_leaf(visit.node))
+
+    def expected_cost(self) -> float:
+        """Cost of a ray by the surface area heuristic, with K_T = 1 and K_I = 1.5."""
+        visits = list(self.walk())
+        return sum(
+            v.area
+            / visits[0].area
+            * (1.5 * int(self.count[v.node]) if self.is_leaf(v.node) else 1.0)
+            for v in visits
+        )
 
     def walk(self) -> Iterator[Visit]:
         """Yields all nodes, parents first, the lower child before the upper one."""

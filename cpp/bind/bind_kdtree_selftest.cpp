@@ -6,6 +6,7 @@
 #include "geometry/cover.h"
 #include "geometry/degenerate.h"
 #include "kdtree/builder.h"
+#include "kdtree/lazy.h"
 #include "kdtree/sah.h"
 
 #include <cstring>
@@ -16,6 +17,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -60,13 +62,20 @@ nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
     {
         nb::gil_scoped_release release;
         built = *build_kd_tree(std::move(triangles), options);
+        finish_growth(built.tree);
     }
     const KdTree &tree = built.tree;
-    const size_t n = tree.nodes.size();
+    // Of a lazy tree, with what has grown behind the part that is built at once.
+    size_t n = tree.nodes.size(), reference_count = tree.references.size();
+    if (tree.growth) {
+        n = tree.growth->state().nodes;
+        reference_count = tree.growth->state().references;
+    }
+    const std::span<const KdNode> nodes(tree.nodes.data(), n);
     std::vector<uint32_t> axis(n), child(n), first(n), count(n);
     std::vector<float> split(n);
     for (size_t i = 0; i < n; ++i) {
-        const KdNode node = tree.nodes[i];
+        const KdNode node = nodes[i];
         if (node.is_leaf()) {
             axis[i] = KdNode::LEAF;
             first[i] = node.first_reference();
@@ -83,8 +92,8 @@ nb::dict build(const TriangleArray &array, const nb::kwargs &kwargs) {
     d["child"] = array_of(std::move(child));
     d["first_reference"] = array_of(std::move(first));
     d["count"] = array_of(std::move(count));
-    d["references"] =
-        array_of(std::vector<uint32_t>(tree.references.begin(), tree.references.end()));
+    d["references"] = array_of(std::vector<uint32_t>(
+        tree.references.data(), tree.references.data() + reference_count));
     d["lo"] = point(tree.bounds.lo);
     d["hi"] = point(tree.bounds.hi);
     d["depth"] = tree.depth;

@@ -236,7 +236,7 @@ def test_leaves_hold_what_overlaps_them(
     assert_no_leaf_lacks(leaves, leaves.of_triangle)
 
 
-@each_builder
+@pytest.mark.parametrize("builder", ["exact", "fast"])
 @pytest.mark.parametrize("scene", LARGE_SCENES)
 def test_leaves_of_large_scenes_hold_what_overlaps_them(builder: str, scene: str) -> None:
     """What a sample of the triangles overlaps, and what overlaps a sample of the leaves."""

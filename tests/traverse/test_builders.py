@@ -94,7 +94,7 @@ def test_same_tree_by_any_number_of_threads(builder: str, name: str) -> None:
             return BuiltTree(vertices[faces], **BUILDERS[builder])
 
     one = built(1)
-    for threads in (2, 2, 3, 8):
+    for threads in (2, 3, 8):
         several = built(threads)
         if builder.startswith("lazy"):
             # Nodes are numbered in the order in which they come about.
@@ -106,6 +106,16 @@ def test_same_tree_by_any_number_of_threads(builder: str, name: str) -> None:
         for figure, value in one.report.items():
             if not figure.startswith("seconds"):
                 assert several.report[figure] == value, figure
+
+
+@pytest.mark.parametrize("name", large_scenes())
+def test_lazy_trees_end_up_as_fast_ones(name: str) -> None:
+    vertices, faces = large_scenes()[name]
+    lazy, fast = (
+        contents(BuiltTree(vertices[faces], **BUILDERS[b])) for b in ("lazy", "fast")
+    )
+    assert len(fast) > 10_000
+    assert lazy == fast
 
 
 class Callers:
