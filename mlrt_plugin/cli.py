@@ -24,7 +24,7 @@ from .options import AOVS
 from .progress import ProgressBar
 from .render import checked_seed, checked_spp, prepare
 from .threads import thread_count
-from .tree_command import add_build_options, add_tree_cache, run_tree
+from .tree_command import add_build_options, add_tree_cache, build_options_of, run_tree
 
 EXIT_ERROR, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
 
@@ -102,6 +102,7 @@ def make_parser() -> argparse.ArgumentParser:
         help=f"further channels, separated by commas: {', '.join(AOVS)}",
     )
     add_tree_cache(render)
+    add_build_options(render, ["builder"])
     tree = commands.add_parser(
         "tree", parents=[common], help="build the tree of a scene and tell what it is like"
     )
@@ -126,6 +127,7 @@ def run_render(arguments: argparse.Namespace) -> None:
             defines=dict(arguments.define),
             resolution=arguments.resolution,
             tree_cache=arguments.tree_cache,
+            **build_options_of(arguments),
         )
         for message in prepared.warnings:
             print(f"mlrt: warning: {message}", file=sys.stderr)

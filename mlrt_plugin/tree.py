@@ -58,21 +58,27 @@ class KdTree:
         points = triples(vertices, "vertices")
         corners = indices(faces, len(points))
         self._tree = core.KdTree(points, corners, **build_options(options))
-        if self._tree.report["dropped_triangles"]:
-            bad: npt.NDArray[np.bool_] = np.any(~np.isfinite(points), axis=1)
-            dropped = np.flatnonzero(bad[corners].any(axis=1))
-            if dropped.size:
-                warnings.warn(
-                    f"{dropped.size} of {len(corners)} faces have vertices with NaN or "
-                    "infinite coordinates in single precision and are left out, first of "
-                    f"them face {dropped[0]}, of vertices {corners[dropped[0]].tolist()}",
-                    MlrtWarning,
-                    stacklevel=2,
-                )
+        self._warn_of_dropped(points, corners)
+
+    def _warn_of_dropped(
+        self, points: npt.NDArray[np.float32], corners: npt.NDArray[np.uint32]
+    ) -> None:
+        if not self._tree.report["dropped_triangles"]:
+            return
+        bad: npt.NDArray[np.bool_] = np.any(~np.isfinite(points), axis=1)
+        dropped = np.flatnonzero(bad[corners].any(axis=1))
+        if dropped.size:
+            warnings.warn(
+                f"{dropped.size} of {len(corners)} faces have vertices with NaN or "
+                "infinite coordinates in single precision and are left out, first of "
+                f"them face {dropped[0]}, of vertices {corners[dropped[0]].tolist()}",
+                MlrtWarning,
+                stacklevel=3,
+            )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the tree to a file, from which `load` gets it back; its faces are not
-        stored.
+        stored. Builds all of a lazy tree first.
 
         The file is written under another name first, so that it is there as a whole or not
         at all. Raises TreeFileError if it cannot be written.
@@ -87,7 +93,8 @@ class KdTree:
         faces: npt.ArrayLike,
         **options: Any,
     ) -> KdTree:
-        """The tree that was saved to a file, as if it had been built from these arguments.
+        """The tree that was saved to a file, as if it had been built from these arguments;
+        a lazy tree comes finished.
 
         Raises TreeFileError if the file does not exist, is damaged, comes from another
         version, or holds the tree of other vertices, faces or options; and what
@@ -97,6 +104,7 @@ class KdTree:
         corners = indices(faces, len(points))
         tree = cls.__new__(cls)
         tree._tree = load_tree(Path(path), points, corners, build_options(options))
+        tree._warn_of_dropped(points, corners)
         return tree
 
     @property

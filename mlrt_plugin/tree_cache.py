@@ -41,7 +41,8 @@ def obtain_tree(
 
     cache: folder of the cache, which is made if need be; None builds. A file that cannot
     be used is replaced, and a cache that cannot be written does no harm, but there are
-    warnings of both.
+    warnings of both. A lazy tree is not kept, as it would have to be finished; a tree of
+    the fast builder that is there serves in its place.
     """
     start = time.perf_counter()
     if cache is None:
@@ -62,16 +63,19 @@ def obtain_tree(
     found = time.perf_counter()
     tree = core.KdTree(vertices, faces, **options)
     built = time.perf_counter()
+    timings = {"find_tree": found - start, "build": built - found}
+    if not core.tree_is_finished(tree):
+        warnings.append(
+            f"tree cache '{cache}' does not keep a tree that is built lazily: build it "
+            "once with builder = fast, and it is used for both"
+        )
+        return ObtainedTree(tree, timings, tuple(warnings))
     try:
         make_folder(Path(cache))
         save_tree(tree, path)
     except TreeFileError as error:
         warnings.append(f"{error}; the tree is not kept for another time")
-    timings = {
-        "find_tree": found - start,
-        "build": built - found,
-        "save_tree": time.perf_counter() - built,
-    }
+    timings["save_tree"] = time.perf_counter() - built
     return ObtainedTree(tree, timings, tuple(warnings))
 
 

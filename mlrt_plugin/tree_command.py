@@ -5,15 +5,18 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ._dispatch import core
 from .options import BUILD_OPTIONS
-from .render import prepare
+from .peak_memory import PeakMemory
+from .scene_import import import_scene
 from .threads import thread_count
-from .tree_report import dropped_by_mesh, report_lines
+from .tree_cache import obtain_tree
+from .tree_report import dropped_by_mesh, invisible_meshes, report_lines, tree_report
 
 
 def add_tree_cache(parser: argparse.ArgumentParser) -> None:
@@ -52,25 +55,33 @@ def build_options_of(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def run_tree(arguments: argparse.Namespace) -> None:
     with thread_count(arguments.threads):
-        prepared = prepare(
-            arguments.scene,
-            sensor=arguments.sensor,
-            defines=dict(arguments.define),
-            tree_cache=arguments.tree_cache,
-            **build_options_of(arguments),
+        start = time.perf_counter()
+        arrays = import_scene(
+            arguments.scene, sensor=arguments.sensor, defines=dict(arguments.define)
         )
-        report = prepared.report
-    for message in prepared.warnings:
+        loaded = time.perf_counter()
+        with PeakMemory() as peak:
+            obtained = obtain_tree(
+                arrays.vertices,
+                arrays.faces,
+                build_options_of(arguments),
+                arguments.tree_cache,
+            )
+        tree = obtained.tree
+        report = {**tree_report(tree), "peak_bytes": peak.bytes}
+    warnings = arrays.warnings + obtained.warnings + invisible_meshes(tree, arrays)
+    for message in warnings:
         print(f"mlrt: warning: {message}", file=sys.stderr)
-    dropped = dropped_by_mesh(prepared.tree, prepared.arrays)
-    options = core.tree_options(prepared.tree)
+    dropped = dropped_by_mesh(tree, arrays)
+    options = core.tree_options(tree)
+    timings = {"load": loaded - start, **obtained.timings}
     if arguments.json:
         figures = {
             "scene": str(arguments.scene),
             "options": options,
             **report,
             "dropped_by_mesh": dropped,
-            "timings": prepared.timings,
+            "timings": timings,
         }
         print(json.dumps(figures, indent=2))
         return
@@ -78,7 +89,7 @@ def run_tree(arguments: argparse.Namespace) -> None:
     if dropped:
         lines.append("Dropped triangles:")
         lines += [f"   {count} of {name}" for name, count in dropped.items()]
-    seconds = ", ".join(f"{name} {value:.3f} s" for name, value in prepared.timings.items())
+    seconds = ", ".join(f"{name} {value:.3f} s" for name, value in timings.items())
     lines.append(f"{arguments.scene}: {seconds}")
     if arguments.verbose:
         lines += [f"  {name}: {value}" for name, value in {**options, **report}.items()]

@@ -101,25 +101,35 @@ def geometry_digest(triangles: npt.NDArray[np.float32]) -> bytes:
     return hashlib.blake2b(size + b"".join(digests), digest_size=DIGEST_SIZE).digest()
 
 
-def canonical(options: Mapping[str, Any]) -> str:
-    """Build options, defaults included, as a text that is the same whenever they are."""
-    return json.dumps(core.build_options(**options), sort_keys=True)
+def options_of_finished(options: Mapping[str, Any]) -> dict[str, Any]:
+    """All build options, defaults included, that give the same finished tree.
+
+    A lazy tree that has grown to its end is that of the fast builder, but for the order of
+    its nodes.
+    """
+    found = dict(core.build_options(**options))
+    if found["builder"] == "lazy":
+        found["builder"] = "fast"
+    return found
 
 
 def file_name(geometry: bytes, options: Mapping[str, Any]) -> str:
     """A name that no other tree has: for the triangles' digest, options and versions."""
     versions = struct.pack("<II", FORMAT_VERSION, core.BUILDER_VERSION)
-    key = hashlib.blake2b(versions + geometry + canonical(options).encode(), digest_size=20)
+    canonical = json.dumps(options_of_finished(options), sort_keys=True)
+    key = hashlib.blake2b(versions + geometry + canonical.encode(), digest_size=20)
     return f"{key.hexdigest()}.kdtree"
 
 
 def save_tree(tree: Any, path: Path) -> None:
-    """Writes a tree of the core, whole or not at all.
+    """Writes a tree of the core, whole or not at all. Builds all of a lazy tree first.
 
     Raises TreeFileError if that is not possible; the file is then as it was before.
     """
+    core.finish_tree(tree)
     nodes, references = core.tree_nodes(tree), core.tree_references(tree)
-    description = json.dumps({"options": core.tree_options(tree), "report": tree.report})
+    options = options_of_finished(core.tree_options(tree))
+    description = json.dumps({"options": options, "report": tree.report})
     header = Header(
         MAGIC,
         FORMAT_VERSION,
@@ -200,7 +210,7 @@ def read_tree(path: Path, loader: Any, geometry: bytes, options: Mapping[str, An
             loader.reserve(header.node_count, header.reference_count)
             description = read_parts(file, header, loader)
         given = parse_description(description)
-        compare_options(given["options"], core.build_options(**options))
+        compare_options(given["options"], options_of_finished(options))
         return loader.finish(given["report"], **options)
     except (FileNotFoundError, NotADirectoryError):
         raise MissingTreeFile(f"tree file '{path}' does not exist") from None

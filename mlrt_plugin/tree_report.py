@@ -27,15 +27,22 @@ def tree_report(tree: Any) -> dict[str, Any]:
     rules 1, 2 and 3. expected_traversals, expected_leaf_visits and
     expected_primitive_visits of a line that crosses the root's cell, and sah_cost, its
     expected cost in units of one traversal. node_bytes, reference_bytes, triangle_bytes
-    and their sum total_bytes. seconds that building took, once.
+    and their sum total_bytes. seconds that building took, once, and of its phases.
+
+    Of a lazy tree the figures are those of the part that is built, and the rules' those of
+    what was split before the first ray. unbuilt_cells and unbuilt_references are what is
+    left to build; built_share is the least share of the triangles that is in none of these
+    cells, the least because a triangle may be in several.
     """
     options = core.tree_options(tree)
     report: dict[str, Any] = {**tree.report, **core.tree_statistics(tree)}
     triangles = len(core.tree_triangles(tree))
     kept = triangles - report["dropped_triangles"]
     nonempty = report["leaves"] - report["empty_leaves"]
-    report["nodes"] = report["inner_nodes"] + report["leaves"]
+    report["nodes"] = report["inner_nodes"] + report["leaves"] + report["unbuilt_cells"]
     report["triangles"] = triangles
+    left = min(report["unbuilt_references"], kept)
+    report["built_share"] = 1 - left / kept if kept else 1.0
     report["references_per_triangle"] = report["references"] / max(1, kept)
     report["references_per_nonempty_leaf"] = report["references"] / max(1, nonempty)
     report["sah_cost"] = (
@@ -94,9 +101,12 @@ def invisible_meshes(tree: Any, arrays: SceneArrays) -> tuple[str, ...]:
 
 
 def report_lines(report: dict[str, Any]) -> list[str]:
-    """The figures of `tree_report` as text; labels are those of Mitsuba where it has
-    them."""
+    """The figures of `tree_report` and peak_bytes as text.
+
+    Labels are those of Mitsuba where it has them.
+    """
     structure = {
+        "Builder": report["builder"],
         "Triangles": f"{report['triangles']} ({size(report['triangle_bytes'])})",
         "Dropped triangles": report["dropped_triangles"],
         "Primitive references": (
@@ -107,10 +117,16 @@ def report_lines(report: dict[str, Any]) -> list[str]:
         "kd-tree leaves": f"{report['leaves']}, {report['empty_leaves']} of them empty",
         "kd-tree depth": report["depth"],
         "Total storage": size(report["total_bytes"]),
+        "Peak storage while building": size(report["peak_bytes"]),
         "Leaf node histogram": " ".join(
             f"{count}({leaves})" for count, leaves in enumerate(report["leaf_histogram"])
         ),
     }
+    if report["unbuilt_cells"]:
+        structure["Built so far"] = (
+            f"{100 * report['built_share']:.1f} %; {report['unbuilt_references']} "
+            f"references in {report['unbuilt_cells']} cells are left"
+        )
     quality = {
         "Empty cells by rule 1": report["empty_cell_splits"],
         "Flat cells by rule 2": report["flat_cell_splits"],
@@ -122,11 +138,19 @@ def report_lines(report: dict[str, Any]) -> list[str]:
         "Expected prim. visits/query": f"{report['expected_primitive_visits']:.2f}",
         "Final cost": f"{report['sah_cost']:.2f}",
     }
+    phases = {
+        name.removeprefix("seconds_"): value
+        for name, value in report.items()
+        if name.startswith("seconds_") and value > 0
+    }
     return [
         "Structural kd-tree statistics:",
         *labelled(structure),
         "Qualitative kd-tree statistics:",
         *labelled(quality),
+        "Seconds of building:",
+        *labelled({"all": f"{report['seconds']:.3f}"}),
+        *labelled({name: f"{value:.3f}" for name, value in phases.items()}),
     ]
 
 
@@ -134,8 +158,10 @@ def labelled(values: dict[str, Any]) -> list[str]:
     return [f"   {label:<28}: {value}" for label, value in values.items()]
 
 
-def size(count: float) -> str:
+def size(count: float | None) -> str:
     """A number of bytes with a unit."""
+    if count is None:
+        return "unknown"
     for unit in ("B", "KiB", "MiB"):
         if count < 1024:
             return f"{count:.4g} {unit}"

@@ -5,6 +5,7 @@
 #include "bind/mesh_arrays.h"
 #include "bind/tree_handle.h"
 #include "geometry/degenerate.h"
+#include "kdtree/lazy.h"
 #include "kdtree/report.h"
 #include "kdtree/serialize.h"
 
@@ -23,11 +24,28 @@ namespace {
 
 using Bytes = nb::ndarray<const uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-// A list as an array (N, words) that borrows it and keeps its owner alive.
-template <typename T, typename List>
-nb::object words_of(const List &list, size_t words, nb::handle owner) {
-    const auto *data = reinterpret_cast<const T *>(list.data());
-    return nb::ndarray<nb::numpy, const T>(data, {list.size(), words}, owner).cast();
+// Elements as an array (N, words) that borrows them and keeps their owner alive.
+template <typename Word, typename T>
+nb::object words_of(const T *elements, uint64_t count, nb::handle owner) {
+    constexpr size_t WORDS = sizeof(T) / sizeof(Word);
+    const auto *data = reinterpret_cast<const Word *>(elements);
+    return nb::ndarray<nb::numpy, const Word>(data, {count, WORDS}, owner).cast();
+}
+
+struct Sizes {
+    uint64_t nodes, references;
+};
+
+// A lazy tree grows in the capacity of its arrays.
+Sizes sizes_of(const KdTree &tree) {
+    if (!tree.growth)
+        return {tree.nodes.size(), tree.references.size()};
+    const GrowthState state = tree.growth->state();
+    return {state.nodes, state.references};
+}
+
+bool is_finished(const KdTree &tree) {
+    return !tree.growth || tree.growth->state().unbuilt_cells == 0;
 }
 
 // A tree that comes in pieces: first its triangles, then the bytes of its nodes and
@@ -106,6 +124,8 @@ nb::dict statistics(const TreeHandle &self) {
     dict["flat_leaves"] = found.flat_leaves;
     dict["references"] = found.references;
     dict["max_leaf_count"] = found.max_leaf_count;
+    dict["unbuilt_cells"] = found.unbuilt_cells;
+    dict["unbuilt_references"] = found.unbuilt_references;
     dict["depth"] = found.depth;
     dict["expected_traversals"] = found.expected_traversals;
     dict["expected_leaf_visits"] = found.expected_leaf_visits;
@@ -142,26 +162,38 @@ void bind_tree_files(nb::module_ &m) {
           [](const TreeHandle &tree) { return build_options_to_dict(tree.options); });
     m.def("tree_statistics", &statistics);
     m.def("tree_dropped", &dropped);
+    m.def("tree_is_finished",
+          [](const TreeHandle &tree) { return is_finished(*tree.tree); });
+    m.def(
+        "finish_tree",
+        [](const TreeHandle &tree) {
+            const nb::gil_scoped_release release;
+            // Rays of other threads may leave behind new cells that are not built.
+            while (!is_finished(*tree.tree))
+                finish_growth(*tree.tree);
+        },
+        "Builds what a lazy tree has not built yet.");
     m.def(
         "tree_nodes",
-        [](const nb::handle_t<TreeHandle> &tree) {
-            return words_of<uint32_t>(nb::cast<const TreeHandle &>(tree).tree->nodes, 2,
-                                      tree);
+        [](const nb::handle_t<TreeHandle> &handle) {
+            const KdTree &tree = *nb::cast<const TreeHandle &>(handle).tree;
+            return words_of<uint32_t>(tree.nodes.data(), sizes_of(tree).nodes, handle);
         },
         "uint32 (N, 2), split or first reference and the rest of each node, in memory of "
         "the tree.");
     m.def(
         "tree_references",
-        [](const nb::handle_t<TreeHandle> &tree) {
-            return words_of<uint32_t>(nb::cast<const TreeHandle &>(tree).tree->references,
-                                      1, tree);
+        [](const nb::handle_t<TreeHandle> &handle) {
+            const KdTree &tree = *nb::cast<const TreeHandle &>(handle).tree;
+            return words_of<uint32_t>(tree.references.data(), sizes_of(tree).references,
+                                      handle);
         },
         "uint32 (R, 1), in memory of the tree.");
     m.def(
         "tree_triangles",
-        [](const nb::handle_t<TreeHandle> &tree) {
-            return words_of<float>(nb::cast<const TreeHandle &>(tree).tree->triangles, 9,
-                                   tree);
+        [](const nb::handle_t<TreeHandle> &handle) {
+            const KdTree &tree = *nb::cast<const TreeHandle &>(handle).tree;
+            return words_of<float>(tree.triangles.data(), tree.triangles.size(), handle);
         },
         "float32 (F, 9), in memory of the tree.");
     nb::class_<TreeLoader>(m, "TreeLoader")
@@ -169,8 +201,9 @@ void bind_tree_files(nb::module_ &m) {
              nb::arg("faces"))
         .def_prop_ro("triangles",
                      [](const nb::handle_t<TreeLoader> &self) {
-                         const auto &loader = nb::cast<const TreeLoader &>(self);
-                         return words_of<float>(loader.stored().triangles, 9, self);
+                         const auto &triangles =
+                             nb::cast<const TreeLoader &>(self).stored().triangles;
+                         return words_of<float>(triangles.data(), triangles.size(), self);
                      })
         .def("reserve", &TreeLoader::reserve, nb::arg("node_count"),
              nb::arg("reference_count"))

@@ -42,6 +42,11 @@ TreeStatistics statistics_of(const KdTree &tree) {
             continue;
         }
         const uint64_t count = node.reference_count();
+        if (node.is_unbuilt()) {
+            ++statistics.unbuilt_cells;
+            statistics.unbuilt_references += count;
+            continue;
+        }
         ++statistics.leaves;
         statistics.empty_leaves += count == 0;
         statistics.flat_leaves += count != 0 && is_flat(visit.cell);

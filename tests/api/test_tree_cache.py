@@ -88,6 +88,24 @@ def test_what_changes_the_tree_misses_the_cache(
     assert "load_tree" in prepare(arguments[0][0], tree_cache=cache, **same).timings
 
 
+def test_a_lazy_tree_is_not_kept_but_a_finished_one_is_used(
+    scene: Path, tmp_path: Path
+) -> None:
+    cache = tmp_path / "cache"
+    expected = render(scene).image
+    lazy = prepare(scene, tree_cache=cache, builder="lazy")
+    (message,) = lazy.warnings
+    assert message.startswith(f"tree cache '{cache}' does not keep a tree")
+    assert set(lazy.timings) == {"load", "find_tree", "build"}
+    assert files(cache) == []
+    prepare(scene, tree_cache=cache, builder="fast")
+    again = prepare(scene, tree_cache=cache, builder="lazy")
+    assert set(again.timings) == {"load", "load_tree"}
+    assert again.warnings == ()
+    for prepared in (lazy, again):
+        assert prepared.render().image.tobytes() == expected.tobytes()
+
+
 def test_light_and_camera_do_not_count(scene_file: SceneFile, tmp_path: Path) -> None:
     prepare(scene_file(), tree_cache=tmp_path / "cache")
     other = scene_file(emitters=scene_files.LAMP.replace("1, 2, 3", "1, 2, 4"))

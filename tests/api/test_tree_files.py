@@ -16,7 +16,7 @@ import workloads
 from kd_trees import BuiltTree
 from tree_file_parts import Parts
 
-from mlrt_plugin import KdTree, MlrtError, TreeFileError
+from mlrt_plugin import KdTree, MlrtError, MlrtWarning, TreeFileError
 from mlrt_plugin._dispatch import core
 
 SEED = 20261122
@@ -61,7 +61,9 @@ SCENES: dict[str, Callable[[], workloads.Scene]] = {
 
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize(
-    "options", [{}, {"clip": False, "area_floor": 0.01, "max_depth": 9}], ids=["", "other"]
+    "options",
+    [{}, {"builder": "fast"}, {"clip": False, "area_floor": 0.01, "max_depth": 9}],
+    ids=["", "fast", "other"],
 )
 def test_round_trip(name: str, options: dict[str, Any], tmp_path: Path) -> None:
     scene = SCENES[name]()
@@ -83,6 +85,50 @@ def test_round_trip(name: str, options: dict[str, Any], tmp_path: Path) -> None:
     loaded.save(tmp_path / "again")
     assert (tmp_path / "again").read_bytes() == path.read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["again", "tree"]
+
+
+@pytest.mark.parametrize("used", [False, True], ids=["", "used before"])
+def test_a_lazy_tree_is_finished_and_saved(used: bool, tmp_path: Path) -> None:
+    scene = scene_of(2000)
+    path = tmp_path / "tree"
+    origins, directions = np.random.default_rng(SEED + 2).normal(size=(2, 400, 3))
+    lazy, fast = KdTree(*scene, builder="lazy"), KdTree(*scene, builder="fast")
+    expected = fast.closest_hit(origins, directions)
+    if used:
+        lazy.closest_hit(origins[:5], directions[:5])
+        assert lazy.report["leaves"] > 0
+        assert lazy.report["unbuilt_cells"] > 0
+    lazy.save(path)
+    assert lazy.report["built_share"] == 1
+    for builder in ("lazy", "fast"):
+        loaded = KdTree.load(path, *scene, builder=builder)
+        assert loaded.report == lazy.report
+        for a, b in zip(expected, loaded.closest_hit(origins, directions), strict=True):
+            assert a.tobytes() == b.tobytes()
+    # The same tree but for the order of its nodes.
+    for name in ("nodes", "leaves", "empty_leaves", "references", "depth"):
+        assert lazy.report[name] == fast.report[name]
+    assert lazy.report["sah_cost"] == pytest.approx(fast.report["sah_cost"], rel=1e-9)
+    assert "builder is fast, not exact" in refusal(path, scene, builder="exact")
+
+
+def test_an_unbuilt_node_is_refused(saved: Saved) -> None:
+    path, scene = saved
+    parts = tree_file_parts.split(path.read_bytes())
+    marked = parts.with_node(0, 0, 1 << 8 | 1 << 2 | 3)
+    path.write_bytes(tree_file_parts.join(marked))
+    assert refusal(path, scene) == "is malformed: node 0 is not built"
+
+
+def test_faces_that_are_left_out_are_told_of_when_loading(tmp_path: Path) -> None:
+    vertices, faces = scene_of(30)
+    vertices[faces[4, 1], 2] = np.nan
+    with pytest.warns(MlrtWarning, match="first of them face 4"):
+        tree = KdTree(vertices, faces)
+    tree.save(tmp_path / "tree")
+    with pytest.warns(MlrtWarning, match="first of them face 4") as caught:
+        KdTree.load(tmp_path / "tree", vertices, faces)
+    assert caught[0].filename == __file__
 
 
 def test_the_file_is_as_described(saved: Saved) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import scene_files
 from mlrt_plugin import prepare
 from mlrt_plugin._dispatch import core
 from mlrt_plugin.cli import main
+from mlrt_plugin.peak_memory import PeakMemory
 
 SceneFile = Callable[..., Path]
 Output = pytest.CaptureFixture[str]
@@ -65,17 +67,42 @@ def test_json(scene_file: SceneFile, capsys: Output) -> None:
     found = figures([str(path)], capsys)
     prepared = prepare(path)
     for name, value in prepared.report.items():
-        assert found[name] == value or name.startswith("seconds")
+        assert found[name] == value or name.startswith("seconds"), name
     assert found["scene"] == str(path)
     assert found["options"] == core.build_options()
     assert found["dropped_by_mesh"] == {}
     assert found.keys() >= {"seconds", "timings", "total_bytes", "references_per_triangle"}
+    peak = found["peak_bytes"]
+    assert peak is None or isinstance(peak, int)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the system does not tell")
+def test_peak_of_memory() -> None:
+    with PeakMemory() as peak:
+        del_me = np.ones(1 << 23)
+        total = del_me.sum()
+        del del_me
+    assert total == 1 << 23
+    assert peak.bytes is None or 60 << 20 < peak.bytes < 120 << 20
+
+
+@pytest.mark.parametrize("builder", ["auto", "exact", "fast", "lazy"])
+def test_builders(builder: str, scene_file: SceneFile, capsys: Output) -> None:
+    path = scene_file()
+    assert main(["tree", str(path), "--builder", builder]) == 0
+    text = capsys.readouterr().out
+    assert ("Built so far" in text) == (builder == "lazy")
+    assert main(["render", str(path), "--builder", builder, "-v"]) == 0
+    text = capsys.readouterr().out
+    assert f"  builder: {'exact' if builder == 'auto' else builder}\n" in text
+    assert "  built_share: " in text
 
 
 FLAGS: dict[str, dict[str, object]] = {
     "--intersection-cost 3.5": {"intersection_cost": 3.5},
     "--no-clip --no-rule-flat-cell": {"clip": False, "rule_flat_cell": False},
     "--rule-area-floor --max-depth 2": {"max_depth": 2},
+    "--builder fast": {"builder": "fast"},
 }
 
 
@@ -98,6 +125,7 @@ def test_each_option_has_a_flag(capsys: Output) -> None:
     [
         ("--max-depth 2.5", 2, "2.5"),
         ("--max-depth 65", 1, "max_depth"),
+        ("--builder slow", 1, "must be one of: auto, exact, fast, lazy"),
         ("--empty-bonus 0", 1, "empty_bonus must be in"),
         ("-t 0", 1, "threads = 0"),
         ("-s 3", 1, "no sensor 3"),
@@ -145,7 +173,8 @@ def test_cache(scene_file: SceneFile, tmp_path: Path, capsys: Output) -> None:
     assert isinstance(second["timings"], dict)
     assert {"build", "save_tree"} <= set(first["timings"])
     assert set(second["timings"]) == {"load", "load_tree"}
-    del first["timings"], second["timings"]
+    for figure in ("timings", "peak_bytes"):
+        del first[figure], second[figure]
     assert first == second
 
     assert main(["render", str(path)]) == 0

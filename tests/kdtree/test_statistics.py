@@ -23,7 +23,7 @@ SCENES: dict[str, Callable[[np.random.Generator], workloads.Scene]] = {
     "flat": workloads.flat,
     "one": lambda rng: workloads.soup(rng, 1),
 }
-COSTS = {"traversal_cost": 2.5, "intersection_cost": 4.0}
+COSTS: dict[str, Any] = {"traversal_cost": 2.5, "intersection_cost": 4.0}
 
 
 @pytest.fixture(params=SCENES)
@@ -70,20 +70,47 @@ def walked(tree: BuiltTree) -> dict[str, Any]:
     }
 
 
-def test_the_report_is_what_a_walk_finds(scene: workloads.Scene) -> None:
+@pytest.mark.parametrize("builder", ["exact", "fast"])
+def test_the_report_is_what_a_walk_finds(scene: workloads.Scene, builder: str) -> None:
     vertices, faces = scene
-    expected = walked(BuiltTree(vertices[faces], **COSTS))
-    report = KdTree(vertices, faces, **COSTS).report
+    expected = walked(BuiltTree(vertices[faces], builder=builder, **COSTS))
+    report = KdTree(vertices, faces, builder=builder, **COSTS).report
+    assert report["builder"] == builder
+    assert report["built_share"] == 1
     assert {name: report[name] for name in expected} == expected
 
 
-def test_the_builder_counts_the_same(scene: workloads.Scene) -> None:
-    tree = KdTree(*scene, **COSTS)
+@pytest.mark.parametrize("builder", ["exact", "fast"])
+def test_the_builder_counts_the_same(scene: workloads.Scene, builder: str) -> None:
+    tree = KdTree(*scene, builder=builder, **COSTS)
     built, found = tree._tree.report, core.tree_statistics(tree._tree)
     both = set(built) & set(found)
     assert both >= {"inner_nodes", "leaves", "empty_leaves", "references", "depth"}
     assert {name: built[name] for name in both} == {name: found[name] for name in both}
     assert built["sah_cost"] == pytest.approx(tree.report["sah_cost"], rel=1e-9)
+
+
+def test_a_lazy_tree_is_told_as_far_as_it_is_built() -> None:
+    scene = workloads.soup(np.random.default_rng(SEED), 3000, 0.01)
+    tree = KdTree(*scene, builder="lazy")
+    before = tree.report
+    assert before["unbuilt_cells"] == before["nodes"] == 1
+    assert before["unbuilt_references"] == 3000
+    assert before["built_share"] == before["leaves"] == before["references"] == 0
+    tree.closest_hit([[0.1, 0.2, -3]], [[0.0, 0.1, 1]])
+    during = tree.report
+    assert 0 < during["unbuilt_references"] < 3000
+    assert during["built_share"] == 1 - during["unbuilt_references"] / 3000
+    assert during["leaves"] > 0
+    assert during["inner_nodes"] + 1 == during["leaves"] + during["unbuilt_cells"]
+    assert during["node_bytes"] == 8 * during["nodes"]
+    assert during["reference_bytes"] == 4 * during["references"]
+    core.finish_tree(tree._tree)
+    after, fast = tree.report, KdTree(*scene, builder="fast").report
+    assert after["built_share"] == 1
+    assert after["unbuilt_cells"] == after["unbuilt_references"] == 0
+    for name in ("nodes", "leaves", "references", "depth", "total_bytes", "leaf_histogram"):
+        assert after[name] == fast[name]
 
 
 def test_a_tree_that_is_one_leaf() -> None:

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from mlrt_plugin.peak_memory import PeakMemory
 from mlrt_plugin.threads import thread_count
 
 from .contenders import WARM_UP_FACES, contenders_of, embree_device
 from .native import loaded
 from .scenes import BenchScene, read_stored, store
 
-OWN_PROCESS = Path("/proc/self")
 SIDE = 1024
 """Pixels along both sides of the frame, as usual."""
 
@@ -59,29 +59,9 @@ def grown_bytes(library: Path, file: Path, name: str, threads: int) -> int | Non
         # What stays whatever is built: threads, code, buffers of rays.
         contender.render(contender.build(small_mesh), view, image, None)
         module.release_memory()
-        if not forget_peak():
-            return None
-        before = resident_bytes("VmRSS")
-        contender.render(contender.build(mesh), view, image, None)
-        peak = resident_bytes("VmHWM")
-    return max(peak - before, 0)
-
-
-def resident_bytes(key: str) -> int:
-    """`VmRSS`, the memory that is resident, or `VmHWM`, the most since `forget_peak`."""
-    for line in (OWN_PROCESS / "status").read_text().splitlines():
-        if line.startswith(key + ":"):
-            return 1024 * int(line.split()[1])
-    raise OSError(f"the system does not tell {key}")
-
-
-def forget_peak() -> bool:
-    """Makes `VmHWM` start from what is resident now, where the system can do that."""
-    try:
-        (OWN_PROCESS / "clear_refs").write_text("5")
-    except OSError:
-        return False
-    return True
+        with PeakMemory() as peak:
+            contender.render(contender.build(mesh), view, image, None)
+    return peak.bytes
 
 
 if __name__ == "__main__":
