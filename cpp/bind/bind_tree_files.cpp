@@ -169,8 +169,9 @@ void bind_tree_files(nb::module_ &m) {
         [](const TreeHandle &tree) {
             const nb::gil_scoped_release release;
             // Rays of other threads may leave behind new cells that are not built.
-            while (!is_finished(*tree.tree))
+            do
                 finish_growth(*tree.tree);
+            while (!is_finished(*tree.tree));
         },
         "Builds what a lazy tree has not built yet.");
     m.def(
