@@ -72,7 +72,7 @@ def obtain_tree(
         return ObtainedTree(tree, timings, tuple(warnings))
     try:
         make_folder(Path(cache))
-        save_tree(tree, path)
+        save_tree(tree, path, geometry)
     except TreeFileError as error:
         warnings.append(f"{error}; the tree is not kept for another time")
     timings["save_tree"] = time.perf_counter() - built

@@ -121,8 +121,10 @@ def file_name(geometry: bytes, options: Mapping[str, Any]) -> str:
     return f"{key.hexdigest()}.kdtree"
 
 
-def save_tree(tree: Any, path: Path) -> None:
+def save_tree(tree: Any, path: Path, geometry: bytes | None = None) -> None:
     """Writes a tree of the core, whole or not at all. Builds all of a lazy tree first.
+
+    geometry: the digest of its triangles if it is known.
 
     Raises TreeFileError if that is not possible; the file is then as it was before.
     """
@@ -134,7 +136,7 @@ def save_tree(tree: Any, path: Path) -> None:
         MAGIC,
         FORMAT_VERSION,
         core.BUILDER_VERSION,
-        geometry_digest(core.tree_triangles(tree)),
+        geometry or geometry_digest(core.tree_triangles(tree)),
         len(nodes),
         len(references),
         len(description.encode()),
