@@ -1,0 +1,149 @@
+"""What mlrt-bench makes of raw runs: which ones count, goals, and the table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from bench_figures import block, run
+from mlrt_compare.bench import build_table
+from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
+from mlrt_compare.bench.measure import Timing, in_turns
+
+QUIET = Timing(wall=1.0, cpu=1.9, waited=0.0)
+
+
+def test_order_is_there_and_back_until_nobody_needs_to_run() -> None:
+    left = {"A": 3, "B": 1, "C": 2}
+
+    def runner(name: str) -> str | None:
+        left[name] -= 1
+        return name if left[name] >= 0 else None
+
+    runs = [lambda n=name: runner(n) for name in left]
+    assert "".join(name for _, name in in_turns(runs, 9)) == "ABCCAA"
+    assert [which for which, _ in in_turns([lambda: "x"] * 2, 3)] == [0, 1, 1, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("timing", "threads", "busy"),
+    [
+        (QUIET, 2, False),
+        (Timing(1.0, 1.0, 0.0), 2, False),  # a serial part of the work is no disturbance
+        (Timing(1.0, 0.5, 0.0), 1, True),
+        (Timing(1.0, 1.9, 0.0), 1, True),
+        (Timing(1.0, 1.0, 0.2), 2, True),
+        (Timing(0.0, 0.0, 0.0), 1, True),
+    ],
+)
+def test_disturbed_runs_are_found(timing: Timing, threads: int, busy: bool) -> None:
+    assert timing.busy(threads) is busy
+
+
+def test_disturbed_runs_count_only_if_there_are_no_others() -> None:
+    runs = [run(9.0, 1.0, busy=True), run(2.0, 1.0), run(3.0, 1.0)]
+    assert seconds({"runs": runs}, ("build",)) == [2.0, 3.0]
+    assert seconds({"runs": runs}, ("build", "frame")) == [3.0, 4.0]
+    assert counted_runs({"runs": runs[:1]}) == runs[:1]
+
+
+@pytest.mark.parametrize(
+    ("best", "median", "verdict"),
+    [(1.0, 1.0, "met"), (2.0, 2.0, "missed"), (0.9, 1.1, "open"), (1.1, 0.9, "open")],
+)
+def test_verdicts(best: float, median: float, verdict: str) -> None:
+    assert Goal("a / b", best, median, 1.0).verdict == verdict
+    assert Goal("a / b", best, median, 1.0, is_set=False).verdict == "not a goal"
+
+
+def goals(scene: str, figures: dict[str, Any]) -> dict[str, Goal]:
+    costs = {"MLRT exact": 50.0, "MLRT fast": 55.0}
+    return {goal.name: goal for goal in goals_of(scene, figures, costs)}
+
+
+def test_goals_are_the_ratios_that_they_name() -> None:
+    figures = block(
+        fast=[run(8.0, 1.0), run(10.0, 1.0)],
+        lazy=[run(0.5, 1.0), run(0.5, 4.0)],
+        high=[run(4.0, 1.0), run(2.0, 1.0)],
+        medium=[run(1.0, 1.0), run(3.0, 1.0)],
+    )
+    figures["contenders"][1]["bytes"] = 3000
+    figures["contenders"][3]["bytes"] = 2000
+    found = goals("building", figures)
+    expected = {
+        "build fast / HIGH": (8 / 2, 9 / 3, 3.0),
+        "bytes fast / MEDIUM": (1.5, 1.5, 1.5),
+        "bytes fast / HIGH": (3.0, 3.0, 1.5),
+        "build + frame lazy / MEDIUM": (1.5 / 2, 3 / 3, 1.0),
+        "SAH cost fast / exact": (1.1, 1.1, 1.05),
+    }
+    assert found.keys() == expected.keys()
+    for name, (best, median, limit) in expected.items():
+        goal = found[name]
+        assert (goal.best, goal.median, goal.limit) == pytest.approx((best, median, limit))
+    assert [goal.verdict for goal in found.values()] == [
+        *("open", "met", "missed", "met", "missed")
+    ]
+
+
+def test_lazy_growth_is_to_pay_in_large_scenes_only() -> None:
+    name = "build + frame lazy / MEDIUM"
+    assert not goals("office", block())[name].is_set
+    assert goals("dragon-7.2M", block())[name].is_set
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "-"),
+        (0, "0"),
+        (1234.5, "1234"),
+        (12.345, "12.35"),
+        (1.234, "1.23"),
+        (0.12345, "0.123"),
+        (0.00012345, "0.000123"),
+    ],
+)
+def test_numbers(value: float | None, text: str) -> None:
+    assert build_table.number(value) == text
+
+
+def test_columns_stand_below_one_another() -> None:
+    lines = build_table.aligned([("", "a", "long head"), ("name", "12.5", "3")])
+    assert lines == ["         a  long head", "name  12.5          3"]
+
+
+def test_table_has_a_row_for_each_contender_and_tells_what_counted() -> None:
+    figures = block(threads=2, fast=[run(7.0, 1.0), run(9.0, 1.0, busy=True)])
+    names = [contender["name"] for contender in figures["contenders"]]
+    scene = {
+        "name": "office",
+        "triangles": 10,
+        "blocks": [figures],
+        "resident_peak_bytes": dict.fromkeys(names, 5_000_000),
+        "sah_cost": {"MLRT fast": 42.0},
+        "ats": {"MLRT fast": {"with_entry_points": 11.0, "from_the_root": 22.0}},
+    }
+    scene["resident_peak_bytes"]["Embree HIGH"] = None
+    lines = build_table.block_lines(scene, figures)
+    assert lines[1] == "office, 10 triangles, 2 threads"
+    rows = {" ".join(line.split()[:2]): line.split()[2:] for line in lines[3:]}
+    assert rows.keys() == set(names)
+    assert rows["MLRT fast"] == [
+        *("7.00", "(7.00)", "7.00", "1.00", "(1.00)", "1.00", "8.00", "(8.00)", "1/2"),
+        *("0.00100", "100.0", "5.00", "42.00", "11.00", "22.00"),
+    ]
+    assert rows["Embree HIGH"][-4:] == ["-"] * 4
+
+
+def test_goals_form_a_table() -> None:
+    figures = block(threads=2)
+    figures["goals"] = [goal.as_dict() for goal in goals("building", figures).values()]
+    other = {"name": "absent", "skipped": "there is no absent.xml"}
+    lines = build_table.goal_lines([{"name": "building", "blocks": [figures]}, other])
+    assert len(lines) == 3
+    assert "build fast / HIGH <= 3" in lines[1]
+    assert lines[2].startswith("building, 2 threads")
+    assert lines[2].count("met") == 4 and lines[2].count("missed") == 1
+    assert build_table.goal_lines([other]) == []
