@@ -286,6 +286,7 @@ def test_embree_tells_what_it_holds(native: Native, office: BenchScene) -> None:
         (("build", "--repeats", "0"), "0 is not from 1"),
         (("build", "--threads", "1,two"), "'two' is not a whole number"),
         (("build", "--threads", "100000"), "100000 is not from 1"),
+        (("build", "--threads", "1,16384"), "16384 threads are too many"),
         (("build", "--resolution", "-3"), "-3 is not from 1"),
         (("build", "--scenes", ","), "no scene is named"),
         (("build", "--scenes", "bunny"), "no scene 'bunny'"),

@@ -13,12 +13,14 @@ import numpy.typing as npt
 
 from mlrt_plugin.threads import thread_count
 
+from .build_table import plural
 from .contenders import EMBREE, MLRT, WARM_UP_FACES, Contender, contenders_of, embree_device
 from .goals import goals_of
 from .measure import Run, in_turns, timed
 from .native import Native
 from .peak import resident_peaks
 from .scenes import BenchScene
+from .status import show_status
 
 ROUNDS_A_REPEAT = 3
 """Runs that others disturb do not count and are repeated, within this limit; chosen."""
@@ -90,6 +92,7 @@ class SceneBenchmark:
             del built
         runs = [partial(self._run, contender, threads) for contender in contenders]
         if not self._peaks:
+            show_status(f"{self._scene.name}: peak memory")
             self._peaks = resident_peaks(
                 self._native.library,
                 self._scene,
@@ -98,6 +101,7 @@ class SceneBenchmark:
             )
         for which, run in in_turns(runs, ROUNDS_A_REPEAT * self._settings.repeats):
             contenders[which].runs.append(run)
+        show_status("")
         block = {
             "threads": threads,
             "embree": {
@@ -121,6 +125,10 @@ class SceneBenchmark:
     def _run(self, contender: Contender, threads: int) -> Run | None:
         if not contender.needs_run(self._settings.repeats):
             return None
+        show_status(
+            f"{self._scene.name}, {plural(threads)}: {contender.name}, run "
+            f"{len(contender.runs) + 1}"
+        )
         gc.collect()
         self._native.module.release_memory()
         built, build = timed(

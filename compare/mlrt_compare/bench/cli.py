@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from .errors import BenchError
+from .status import show_status
 
 if TYPE_CHECKING:
     from .build import SceneBenchmark
@@ -43,6 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return COULD_NOT_RUN
     except KeyboardInterrupt:
+        show_status("")
         print(f"{PROGRAM}: interrupted", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
@@ -120,6 +122,7 @@ def run_build(options: argparse.Namespace) -> int:
     from .native import load_native
     from .scenes import chosen_scenes
 
+    check_threads(options.threads)
     source = find_checkout(options.source)
     scenes = chosen_scenes(options.scenes, source)
     cache = options.cache or default_cache()
@@ -208,6 +211,17 @@ def check_outputs(options: argparse.Namespace) -> None:
             raise BenchError(f"there is no folder {path.parent} to write {path} to")
     if options.images is not None and options.images.is_file():
         raise BenchError(f"{options.images} to write images to is not a folder")
+
+
+def check_threads(threads: Sequence[int]) -> None:
+    """Raises BenchError for more threads than Embree can be built with."""
+    # Its tasks' storage has room for twice the processors (taskschedulerinternal.h).
+    limit = 2 * (os.cpu_count() or 1)
+    if max(threads) > limit:
+        raise BenchError(
+            f"{max(threads)} threads are too many: Embree takes at most {limit} on this "
+            "machine"
+        )
 
 
 def default_cache() -> Path:
