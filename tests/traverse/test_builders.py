@@ -15,8 +15,10 @@ from workloads import Rays, Scene
 
 from mlrt_plugin._dispatch import core
 from mlrt_plugin.threads import thread_count
+from mlrt_plugin.tree_report import tree_report
 
 SEED = 20260214
+FIGURES = ("nodes", "leaves", "empty_leaves", "references", "depth", "sah_cost")
 
 
 def large_scenes() -> dict[str, Scene]:
@@ -141,6 +143,29 @@ class Callers:
         for thread in threads:
             thread.join()
         return self.hits
+
+
+def test_lazy_trees_are_finished_while_others_ask() -> None:
+    """What is finished has the figures of the fast builder's tree."""
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 2000, 0.1)
+    rays = workloads.all_rays(rng, scene, 200)
+    fast = tree_of("fast", scene)
+    expected = closest(fast, rays, TRAVERSALS["packet"])
+    figures = {name: tree_report(fast)[name] for name in FIGURES}
+    with thread_count(2):
+        for _ in range(30):
+            tree = tree_of("lazy", scene)
+            callers = Callers(tree, [(rays, TRAVERSALS["single"])] * 3)
+            asking = threading.Thread(target=callers.run)
+            asking.start()
+            core.finish_tree(tree)
+            report = tree_report(tree)
+            asking.join()
+            assert {name: report[name] for name in FIGURES} == pytest.approx(figures)
+            for hits in callers.hits:
+                assert hits is not None
+                hits.assert_same(expected)
 
 
 def part(rays: Rays, order: npt.NDArray[np.int64]) -> Rays:
