@@ -87,7 +87,9 @@ class ReferenceBuilder:
             bounds,
         )
         count = len(triangles)
-        self.floor = options.area_floor or min(max(0.3 / count, 1e-7), 1e-4)
+        areas = np.array([Cell(lo, hi).area for lo, hi in bounds]) / self.root.area
+        typical = math.exp(np.log(areas[areas > 0]).mean()) if (areas > 0).any() else 1.0
+        self.floor = options.area_floor or min(6 * typical, 1e-4)
         depth = min(options.max_depth or MAX_DEPTH, MAX_DEPTH)
         splits = int(8 + 1.3 * math.log2(count))
         self.tree = self._build(self.root, depth, splits, 2, 8 + 65536 / count)

@@ -9,7 +9,7 @@
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
 #include "geometry/triangle_test.h"
-#include "kdtree/chunks.h"
+#include "kdtree/lazy.h"
 
 #include <memory>
 #include <mutex>
@@ -177,7 +177,12 @@ void bind_tree(nb::module_ &m) {
             },
             nb::arg("vertices"), nb::arg("faces"), nb::arg("options"))
         .def_prop_ro("report",
-                     [](const TreeHandle &self) { return report_to_dict(self.report); })
+                     [](const TreeHandle &self) {
+                         BuildReport report = self.report;
+                         if (self.tree->growth)
+                             report.add(self.tree->growth->report());
+                         return report_to_dict(report);
+                     })
         .def_prop_ro("bounds",
                      [](const TreeHandle &self) {
                          const Box3f &b = self.tree->bounds;

@@ -168,10 +168,7 @@ void bind_tree_files(nb::module_ &m) {
         "finish_tree",
         [](const TreeHandle &tree) {
             const nb::gil_scoped_release release;
-            // Rays of other threads may leave behind new cells that are not built.
-            do
-                finish_growth(*tree.tree);
-            while (!is_finished(*tree.tree));
+            finish_growth(*tree.tree);
         },
         "Builds what a lazy tree has not built yet.");
     m.def(

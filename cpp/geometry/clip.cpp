@@ -43,14 +43,17 @@ constexpr double UNDERFLOW = std::numeric_limits<double>::min();
 struct Corner {
     Vec3d q;
     Vec3d error;
+
+    Corner() {} // left as it is: most corners of a polygon are never used
+    Corner(Vec3d q, Vec3d error) : q(q), error(error) {}
 };
 
 // A plane adds one corner for each run of outside corners. Runs are separated by corners
 // that stay, so n corners become at most n + n / 2. In exact arithmetic it is one run.
-constexpr int CAPACITY = 28;
+constexpr int CAPACITY = 42;
 static_assert([] {
     int count = 3;
-    for (int plane = 0; plane < 6; ++plane)
+    for (int plane = 0; plane < 7; ++plane) // those of a cell and one that splits it
         count += count / 2;
     return count;
 }() <= CAPACITY);
@@ -127,27 +130,23 @@ float round_up(double x) {
     return -round_down(-x);
 }
 
-} // namespace
-
-Box3f bounds_of(const Triangle &triangle) {
-    Box3f bounds;
-    for (int i = 0; i < 3; ++i)
-        bounds.add(triangle[i]);
-    return bounds;
+bool misses(const Box3f &bounds, const Box3f &cell) {
+    for (int k = 0; k < 3; ++k)
+        if (bounds.hi[k] < cell.lo[k] || bounds.lo[k] > cell.hi[k])
+            return true;
+    return false;
 }
 
-Box3f clip_triangle(const Triangle &triangle, const Box3f &cell) {
-    const Box3f whole = bounds_of(triangle);
-    bool inside = true;
-    for (int k = 0; k < 3; ++k) {
-        if (whole.hi[k] < cell.lo[k] || whole.lo[k] > cell.hi[k])
-            return {};
-        inside = inside && whole.lo[k] >= cell.lo[k] && whole.hi[k] <= cell.hi[k];
-    }
-    if (inside)
-        return whole;
+bool lies_in(const Box3f &bounds, const Box3f &cell) {
+    for (int k = 0; k < 3; ++k)
+        if (bounds.lo[k] < cell.lo[k] || bounds.hi[k] > cell.hi[k])
+            return false;
+    return true;
+}
 
-    Polygon buffers[2];
+// The part of the triangle in the cell, in one of the buffers; null if there is none.
+const Polygon *clip_polygon(const Triangle &triangle, const Box3f &cell,
+                            Polygon (&buffers)[2]) {
     Polygon *polygon = &buffers[0], *scratch = &buffers[1];
     polygon->count = 3;
     for (int i = 0; i < 3; ++i)
@@ -162,14 +161,18 @@ Box3f clip_triangle(const Triangle &triangle, const Box3f &cell) {
             std::swap(polygon, scratch);
         }
         if (polygon->count == 0)
-            return {};
+            return nullptr;
     }
+    return polygon;
+}
 
+// Bounds of the polygon that was cut at the cell's planes, outwards to single precision.
+Box3f rounded_bounds(const Polygon &polygon, const Box3f &cell, const Box3f &whole) {
     Box3f bounds;
     for (int k = 0; k < 3; ++k) {
         double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-        for (int i = 0; i < polygon->count; ++i) {
-            const Corner &corner = polygon->corners[i];
+        for (int i = 0; i < polygon.count; ++i) {
+            const Corner &corner = polygon.corners[i];
             lo = std::min(lo, corner.q[k] - corner.error[k]);
             hi = std::max(hi, corner.q[k] + corner.error[k]);
         }
@@ -181,6 +184,47 @@ Box3f clip_triangle(const Triangle &triangle, const Box3f &cell) {
             return {};
     }
     return bounds;
+}
+
+} // namespace
+
+Box3f bounds_of(const Triangle &triangle) {
+    Box3f bounds;
+    for (int i = 0; i < 3; ++i)
+        bounds.add(triangle[i]);
+    return bounds;
+}
+
+Box3f clip_triangle(const Triangle &triangle, const Box3f &cell) {
+    const Box3f whole = bounds_of(triangle);
+    if (misses(whole, cell))
+        return {};
+    if (lies_in(whole, cell))
+        return whole;
+    Polygon buffers[2];
+    const Polygon *polygon = clip_polygon(triangle, cell, buffers);
+    return polygon ? rounded_bounds(*polygon, cell, whole) : Box3f{};
+}
+
+ClippedHalves clip_to_halves(const Triangle &triangle, const Box3f &cell, int axis,
+                             float position) {
+    const Box3f whole = bounds_of(triangle);
+    if (misses(whole, cell))
+        return {};
+    Polygon buffers[2], half;
+    const Polygon *polygon = clip_polygon(triangle, cell, buffers);
+    if (!polygon)
+        return {};
+    Box3f lower_cell = cell, upper_cell = cell;
+    lower_cell.hi[axis] = upper_cell.lo[axis] = position;
+    ClippedHalves halves;
+    cut<-1>(*polygon, half, axis, position);
+    if (half.count > 0)
+        halves.lower = rounded_bounds(half, lower_cell, whole);
+    cut<1>(*polygon, half, axis, position);
+    if (half.count > 0)
+        halves.upper = rounded_bounds(half, upper_cell, whole);
+    return halves;
 }
 
 } // namespace mlrt

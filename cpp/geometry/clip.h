@@ -15,4 +15,11 @@ Box3f bounds_of(const Triangle &triangle);
 // errors of double precision may also be given bounds.
 Box3f clip_triangle(const Triangle &triangle, const Box3f &cell);
 
+// The same for both parts of a cell that the plane {x[axis] = position} cuts in two.
+struct ClippedHalves {
+    Box3f lower, upper;
+};
+ClippedHalves clip_to_halves(const Triangle &triangle, const Box3f &cell, int axis,
+                             float position);
+
 } // namespace mlrt

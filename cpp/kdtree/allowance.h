@@ -2,6 +2,9 @@
 #pragma once
 
 #include "kdtree/builder.h"
+#include "kdtree/reference.h"
+
+#include <span>
 
 namespace mlrt {
 
@@ -16,8 +19,10 @@ struct Allowance {
 // Of the root of a tree over `count` triangles.
 Allowance whole_allowance(const BuildOptions &options, uint64_t count);
 
-// Rule 3 (b): share of the scene's surface area below which a cell stays whole.
-double area_floor_of(const BuildOptions &options, uint64_t count);
+// Rule 3 (b): share of the scene's surface area, `scene_area`, below which a cell stays
+// whole. `references` have the bounds of whole triangles.
+double area_floor_of(const BuildOptions &options, std::span<const Reference> references,
+                     double scene_area);
 
 // No tree over `count` triangles has more references, as the duplication is limited.
 uint64_t max_references_of(uint64_t count);

@@ -14,7 +14,12 @@ std::optional<Choice> choose_fast(const References &references, const Box3f &cel
         for (const PlanarGroup &group :
              few ? planar_groups_of_few(references, cell) : bins->planar_groups())
             if (covers(group, cell, triangles)) {
-                const Candidate candidate = flat_cell(group, cell, options);
+                uint64_t below = 0, above = 0;
+                for (const Reference &reference : references.list) {
+                    below += reference.bounds.lo[group.axis] < group.position;
+                    above += reference.bounds.hi[group.axis] > group.position;
+                }
+                const Candidate candidate = flat_cell(group, below, above, cell, options);
                 if (!flat || is_cheaper(candidate.cost, flat->cost))
                     flat = candidate;
             }

@@ -1,7 +1,6 @@
 #include "kdtree/bins.h"
 
 #include <algorithm>
-#include <map>
 
 namespace mlrt {
 
@@ -14,6 +13,67 @@ constexpr int FEW_BINS = 32;
 // Bins are swept as long as one may hold a plane that is better by this factor.
 constexpr int MAX_SWEEPS = 6;
 constexpr double WORTH_A_SWEEP = 0.98;
+
+// A stretch of an axis. What begins in front of it is below all of its planes, what ends
+// behind it is above them: so much a plane in it costs at least.
+struct Stretch {
+    double least_cost = std::numeric_limits<double>::infinity();
+    uint64_t below = 0, above = 0; // at its beginning
+};
+
+// The cost is linear between `first` and `last` as long as the counts stay.
+double least_cost(const SplitCost &cost, double first, double last, uint64_t below,
+                  uint64_t above) {
+    return std::min(cost(first, below, above), cost(last, below, above));
+}
+
+// As sweep_events, for events in any order. Of many events only those are sorted that lie
+// where the best plane may be.
+constexpr size_t MANY_EVENTS = 2048;
+
+void sweep_unsorted(std::vector<Event> &events, uint64_t below, uint64_t above,
+                    const SweptAxis &axis, BestPlane &best) {
+    if (events.size() <= MANY_EVENTS) {
+        std::sort(events.begin(), events.end());
+        sweep_events(events, below, above, axis, best);
+        return;
+    }
+    const auto [first, last] = std::minmax_element(
+        events.begin(), events.end(),
+        [](const Event &a, const Event &b) { return a.position() < b.position(); });
+    const float lo = first->position(), hi = last->position();
+    const float scale = float(Bins::MAX_BINS / (double(hi) - double(lo)));
+    const auto bin_of = [&](const Event &event) {
+        return std::min(int((event.position() - lo) * scale), Bins::MAX_BINS - 1);
+    };
+    if (!(scale < std::numeric_limits<float>::infinity())) {
+        std::sort(events.begin(), events.end());
+        sweep_events(events, below, above, axis, best);
+        return;
+    }
+    std::array<uint64_t, Bins::MAX_BINS> begin{}, end{};
+    for (const Event &event : events) {
+        begin[bin_of(event)] += event.type() != EventType::end;
+        end[bin_of(event)] += event.type() != EventType::start;
+    }
+    std::array<Stretch, Bins::MAX_BINS> stretches;
+    const double width = (double(hi) - double(lo)) / Bins::MAX_BINS;
+    for (int i = 0; i < Bins::MAX_BINS; ++i) {
+        const uint64_t above_behind = above - end[i];
+        const double start = lo + i * width;
+        stretches[i] = {least_cost(axis.cost, start, start + width, below, above_behind),
+                        below, above};
+        below += begin[i];
+        above = above_behind;
+    }
+    const auto chosen = std::min_element(
+        stretches.begin(), stretches.end(),
+        [](const Stretch &a, const Stretch &b) { return a.least_cost < b.least_cost; });
+    const int bin = int(chosen - stretches.begin());
+    std::erase_if(events, [&](const Event &event) { return bin_of(event) != bin; });
+    std::sort(events.begin(), events.end());
+    sweep_events(events, chosen->below, chosen->above, axis, best);
+}
 
 struct BoundsPackets {
     PointPacket lo, hi; // the fourth lane is zero
@@ -31,10 +91,14 @@ BoundsPackets bounds_packets(const Reference &reference) {
 } // namespace
 
 BinGrid::BinGrid(const Box3f &cell, int count)
-    : origin_{cell.lo.x, cell.lo.y, cell.lo.z, 0}, last_(float(count - 1)) {
+    : origin_{cell.lo.x, cell.lo.y, cell.lo.z, 0}, enlarge_{1, 1, 1, 1},
+      last_(float(count - 1)) {
+    constexpr double TINY = 0x1p-60;
     for (int k = 0; k < 3; ++k)
-        if (const double length = extent(cell, k); length > 0)
-            scale_[k] = float(count / length);
+        if (const double length = extent(cell, k); length > 0) {
+            enlarge_[k] = length < TINY ? float(1 / TINY) : 1;
+            scale_[k] = float(count / (length * enlarge_[k]));
+        }
 }
 
 Bins::Bins(const References &references, const Box3f &cell, Threads threads)
@@ -81,39 +145,32 @@ void Bins::count_range(uint64_t first, uint64_t last, Counts &counts) const {
 }
 
 std::optional<Candidate> Bins::best_plane(const BuildOptions &options) const {
-    // What begins in front of a bin is below all of its planes, what ends behind it is
-    // above them: the least that a plane inside can cost, and what its sweep starts from.
-    struct BinBound {
-        double cost;
-        uint64_t below, above;
-    };
-    std::array<std::array<BinBound, MAX_BINS>, 3> bounds;
     // Only two planes an axis have nothing on one side, and they need no bins. All others
     // are without the bonus.
     BuildOptions without_bonus = options;
     without_bonus.empty_bonus = 1;
     BestPlane best;
+    std::array<std::array<Stretch, MAX_BINS>, 3> stretches;
     const uint64_t count = references_.count();
     for (int k = 0; k < 3; ++k) {
-        const bool flat = !(cell_.lo[k] < cell_.hi[k]);
-        const SplitCost cost(without_bonus, cell_, k);
-        if (!flat) {
-            const SweptAxis swept(options, cell_, k);
-            const float first = references_.bounds.lo[k], last = references_.bounds.hi[k];
-            if (swept.lo < first)
-                swept.offer(first, 0, count, false, best);
-            if (last < swept.hi)
-                swept.offer(last, count, 0, true, best);
+        if (!(cell_.lo[k] < cell_.hi[k])) {
+            std::fill_n(stretches[k].begin(), bin_count_, Stretch{});
+            continue;
         }
+        const SweptAxis swept(options, cell_, k);
+        const float first = references_.bounds.lo[k], last = references_.bounds.hi[k];
+        if (swept.lo < first)
+            swept.offer(first, 0, count, false, best);
+        if (last < swept.hi)
+            swept.offer(last, count, 0, true, best);
+        const SplitCost cost(without_bonus, cell_, k);
         const double width = extent(cell_, k) / bin_count_;
         uint64_t below = 0, above = count;
         for (int i = 0; i < bin_count_; ++i) {
             const uint64_t above_behind = above - counts_.end[k][i];
-            const double first = cell_.lo[k] + i * width;
-            bounds[k][i] = {flat ? std::numeric_limits<double>::infinity()
-                                 : std::min(cost(first, below, above_behind),
-                                            cost(first + width, below, above_behind)),
-                            below, above};
+            const double start = cell_.lo[k] + i * width;
+            stretches[k][i] = {least_cost(cost, start, start + width, below, above_behind),
+                               below, above};
             below += counts_.begin[k][i];
             above = above_behind;
         }
@@ -123,44 +180,50 @@ std::optional<Candidate> Bins::best_plane(const BuildOptions &options) const {
         int axis = 0, bin = 0;
         for (int k = 0; k < 3; ++k)
             for (int i = 0; i < bin_count_; ++i)
-                if (bounds[k][i].cost < bounds[axis][bin].cost)
+                if (stretches[k][i].least_cost < stretches[axis][bin].least_cost)
                     axis = k, bin = i;
-        BinBound &bound = bounds[axis][bin];
-        if (!(bound.cost < best.cost * WORTH_A_SWEEP))
+        Stretch &chosen = stretches[axis][bin];
+        if (!(chosen.least_cost < best.cost * WORTH_A_SWEEP))
             break;
         const SweptAxis swept(options, cell_, axis);
-        const std::vector<Event> events = events_within(axis, bin);
-        sweep_events(events, bound.below, bound.above, swept, best);
-        // The border too: nothing may begin or end in the bins beside it.
+        // The border in front too: nothing may begin or end near it.
         const float border = float(swept.lo + bin * (extent(cell_, axis) / bin_count_));
-        if (swept.lo < border && border < swept.hi &&
-            (events.empty() || border < events.front().position()))
-            swept.offer(border, bound.below, bound.above, true, best);
-        bound.cost = std::numeric_limits<double>::infinity();
+        std::vector<Event> events = events_within(axis, bin);
+        const bool border_is_free =
+            std::none_of(events.begin(), events.end(),
+                         [&](const Event &event) { return event.position() <= border; });
+        if (border_is_free && swept.lo < border && border < swept.hi)
+            swept.offer(border, chosen.below, chosen.above, true, best);
+        sweep_unsorted(events, chosen.below, chosen.above, swept, best);
+        chosen.least_cost = std::numeric_limits<double>::infinity();
     }
     return best.candidate();
 }
 
 std::vector<Event> Bins::events_within(int axis, int bin) const {
-    const auto inside = [&](float position) { return grid_.index(axis, position) == bin; };
-    std::vector<std::vector<Event>> parts(chunk_count(references_.count()));
-    for_each_chunk(references_.count(), threads_,
-                   [&](uint32_t chunk, uint64_t first, uint64_t last) {
-                       std::vector<Event> &events = parts[chunk];
-                       for (uint64_t i = first; i < last; ++i) {
-                           const Box3f &bounds = references_.list[i].bounds;
-                           const float lo = bounds.lo[axis], hi = bounds.hi[axis];
-                           if (inside(lo))
-                               events.emplace_back(
-                                   lo, lo == hi ? EventType::planar : EventType::start, 0);
-                           if (lo != hi && inside(hi))
-                               events.emplace_back(hi, EventType::end, 0);
-                       }
-                   });
-    std::vector<Event> events = std::move(parts[0]);
-    for (size_t i = 1; i < parts.size(); ++i)
-        events.insert(events.end(), parts[i].begin(), parts[i].end());
-    std::sort(events.begin(), events.end());
+    const BinGrid::Interval interval = grid_.interval(axis, bin, bin_count_);
+    const auto gather = [&](uint64_t first, uint64_t last, std::vector<Event> &events) {
+        for (uint64_t i = first; i < last; ++i) {
+            const Box3f &bounds = references_.list[i].bounds;
+            const float lo = bounds.lo[axis], hi = bounds.hi[axis];
+            if (interval.contains(lo))
+                events.emplace_back(lo, lo == hi ? EventType::planar : EventType::start, 0);
+            if (lo != hi && interval.contains(hi))
+                events.emplace_back(hi, EventType::end, 0);
+        }
+    };
+    std::vector<Event> events;
+    const uint64_t count = references_.count();
+    if (count <= CHUNK) {
+        gather(0, count, events);
+        return events;
+    }
+    std::vector<std::vector<Event>> parts(chunk_count(count));
+    for_each_chunk(count, threads_, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+        gather(first, last, parts[chunk]);
+    });
+    for (const std::vector<Event> &part : parts)
+        events.insert(events.end(), part.begin(), part.end());
     return events;
 }
 
@@ -168,35 +231,47 @@ std::vector<PlanarGroup> Bins::planar_groups() const {
     std::vector<PlanarGroup> groups;
     if (!counts_.any_flat)
         return groups;
-    for (int axis = 0; axis < 3; ++axis)
-        for (int bin = 0; bin < bin_count_; ++bin) {
-            if (!(cell_.lo[axis] < cell_.hi[axis]) ||
-                !(cover_limit(cell_, axis, counts_.flat_area[axis][bin]) >= 1))
-                continue;
-            std::map<float, PlanarGroup> by_position;
-            for (const Reference &reference : references_.list) {
-                const float position = reference.bounds.lo[axis];
-                if (position != reference.bounds.hi[axis] ||
-                    grid_.index(axis, position) != bin)
-                    continue;
-                PlanarGroup &group =
-                    by_position.try_emplace(position, PlanarGroup{axis, position, {}, 0, 0})
-                        .first->second;
-                group.planar.push_back(reference);
-            }
-            for (auto &[position, group] : by_position) {
-                double area = 0;
-                for (const Reference &reference : group.planar)
-                    area += area_across(reference.bounds, axis);
-                if (!(cover_limit(cell_, axis, area) >= 1))
-                    continue;
-                for (const Reference &reference : references_.list) {
-                    group.below += reference.bounds.lo[axis] < position;
-                    group.above += reference.bounds.hi[axis] > position;
-                }
-                groups.push_back(std::move(group));
-            }
+    struct Flat {
+        float position;
+        uint32_t number; // in the list
+
+        bool operator<(const Flat &other) const {
+            return position < other.position ||
+                   (position == other.position && number < other.number);
         }
+    };
+    std::vector<Flat> flats;
+    for (int axis = 0; axis < 3; ++axis) {
+        std::array<bool, MAX_BINS> full{};
+        bool any_full = false;
+        if (cell_.lo[axis] < cell_.hi[axis])
+            for (int bin = 0; bin < bin_count_; ++bin) {
+                full[bin] = cover_limit(cell_, axis, counts_.flat_area[axis][bin]) >= 1;
+                any_full |= full[bin];
+            }
+        if (!any_full)
+            continue;
+        flats.clear();
+        for (uint32_t i = 0; i < references_.count(); ++i) {
+            const Box3f &bounds = references_.list[i].bounds;
+            if (bounds.lo[axis] == bounds.hi[axis] &&
+                full[grid_.index(axis, bounds.lo[axis])])
+                flats.push_back({bounds.lo[axis], i});
+        }
+        std::sort(flats.begin(), flats.end());
+        for (size_t first = 0, last = 0; first < flats.size(); first = last) {
+            const float position = flats[first].position;
+            double area = 0;
+            for (; last < flats.size() && flats[last].position == position; ++last)
+                area += area_across(references_.list[flats[last].number].bounds, axis);
+            if (!(cover_limit(cell_, axis, area) >= 1))
+                continue;
+            PlanarGroup group{axis, position, {}};
+            for (size_t i = first; i < last; ++i)
+                group.planar.push_back(references_.list[flats[i].number]);
+            groups.push_back(std::move(group));
+        }
+    }
     return groups;
 }
 

@@ -9,6 +9,7 @@
 #include "kdtree/sweep.h"
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -21,14 +22,30 @@ public:
     BinGrid(const Box3f &cell, int count);
 
     int index(int axis, float position) const {
-        return int(
-            minimum(maximum((position - origin_[axis]) * scale_[axis], 0.0f), last_));
+        const float scaled = (position - origin_[axis]) * enlarge_[axis] * scale_[axis];
+        return int(minimum(maximum(scaled, 0.0f), last_));
+    }
+
+    // The positions that one bin holds.
+    struct Interval {
+        float origin, enlarge, scale, first, last;
+
+        bool contains(float position) const {
+            const float scaled = (position - origin) * enlarge * scale;
+            return scaled >= first && scaled < last;
+        }
+    };
+    Interval interval(int axis, int bin, int count) const {
+        constexpr float infinite = std::numeric_limits<float>::infinity();
+        return {origin_[axis], enlarge_[axis], scale_[axis],
+                bin == 0 ? -infinite : float(bin),
+                bin == count - 1 ? infinite : float(bin + 1)};
     }
 
     // Along all axes at once.
     std::array<int32_t, 4> indices(const PointPacket &point) const {
-        const PointPacket bins =
-            (point - load<PointPacket>(origin_)) * load<PointPacket>(scale_);
+        const PointPacket bins = (point - load<PointPacket>(origin_)) *
+                                 load<PointPacket>(enlarge_) * load<PointPacket>(scale_);
         std::array<int32_t, 4> result;
         store(result.data(),
               PointIndices(minimum(maximum(bins, PointPacket(0.0f)), PointPacket(last_))));
@@ -36,7 +53,8 @@ public:
     }
 
 private:
-    float origin_[4], scale_[4] = {};
+    // The scale is in two factors: one alone may be infinite for a cell of tiny extent.
+    float origin_[4], enlarge_[4], scale_[4] = {};
     float last_;
 };
 
@@ -63,7 +81,7 @@ public:
 
 private:
     void count_range(uint64_t first, uint64_t last, Counts &counts) const;
-    // Events of the references in a bin, sorted.
+    // Events of the references in a bin, in any order.
     std::vector<Event> events_within(int axis, int bin) const;
 
     const References &references_;

@@ -118,7 +118,9 @@ std::optional<BuiltTree> build_kd_tree(HugeArray<Triangle> triangles,
         report.leaves = report.empty_leaves = 1;
     } else {
         const BuildFrame frame{options, surface_area(tree.bounds),
-                               area_floor_of(options, count)};
+                               area_floor_of(options,
+                                             {references.begin(), references.end()},
+                                             surface_area(tree.bounds))};
         const auto build = report.builder == Builder::exact  ? build_exact
                            : report.builder == Builder::fast ? build_fast
                                                              : build_lazy;

@@ -1,7 +1,6 @@
 #include "kdtree/events.h"
 
-#include "geometry/clip.h"
-#include "kdtree/sah.h"
+#include "kdtree/cut_reference.h"
 
 #include <algorithm>
 
@@ -54,18 +53,12 @@ CellContents make_contents(std::vector<Reference> references) {
     return contents;
 }
 
-void ContentsSplitter::add_part(const Reference &whole, const Box3f &child, int side,
+void ContentsSplitter::add_part(const Box3f &part, uint32_t triangle, int side,
                                 CellContents &contents) {
-    Box3f part = clip_ ? clip_triangle(triangles_[whole.triangle], child) : child;
-    // Also within what was known before: bounds only ever shrink.
-    for (int k = 0; k < 3; ++k) {
-        part.lo[k] = std::max(part.lo[k], whole.bounds.lo[k]);
-        part.hi[k] = std::min(part.hi[k], whole.bounds.hi[k]);
-    }
     if (part.empty())
         return;
     const uint32_t number = uint32_t(contents.count());
-    contents.references.push_back({part, whole.triangle});
+    contents.references.push_back({part, triangle});
     for (int k = 0; k < 3; ++k)
         append_events(fresh_[side][k], part, k, number);
 }
@@ -74,8 +67,6 @@ void ContentsSplitter::split(const CellContents &contents, const Box3f &cell,
                              const SplitPlane &plane, CellContents &lower,
                              CellContents &upper) {
     const auto [axis, position, planar_below] = plane;
-    const Box3f lower_cell = lower_part(cell, axis, position);
-    const Box3f upper_cell = upper_part(cell, axis, position);
     for (auto &side : fresh_)
         for (auto &events : side)
             events.clear();
@@ -89,8 +80,10 @@ void ContentsSplitter::split(const CellContents &contents, const Box3f &cell,
         const bool above = reference.bounds.hi[axis] > position;
         if (below && above) {
             destinations_[i] = CUT;
-            add_part(reference, lower_cell, 0, lower);
-            add_part(reference, upper_cell, 1, upper);
+            const ClippedHalves parts =
+                parts_of(reference, triangles_[reference.triangle], cell, plane, clip_);
+            add_part(parts.lower, reference.triangle, 0, lower);
+            add_part(parts.upper, reference.triangle, 1, upper);
         } else {
             const bool to_upper = above || (!below && !planar_below);
             CellContents &child = to_upper ? upper : lower;

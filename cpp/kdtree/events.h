@@ -64,8 +64,7 @@ public:
                CellContents &lower, CellContents &upper);
 
 private:
-    void add_part(const Reference &whole, const Box3f &child, int side,
-                  CellContents &contents);
+    void add_part(const Box3f &part, uint32_t triangle, int side, CellContents &contents);
 
     std::span<const Triangle> triangles_;
     bool clip_;

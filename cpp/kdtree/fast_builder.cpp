@@ -1,11 +1,12 @@
 #include "kdtree/fast_builder.h"
 
 #include "base/parallel.h"
-#include "kdtree/binned_method.h"
 #include "kdtree/relocate.h"
 #include "kdtree/top.h"
+#include "kdtree/workspaces.h"
 
 #include <chrono>
+#include <memory>
 
 namespace mlrt {
 
@@ -70,6 +71,7 @@ void build_fast(KdTree &tree, BuildReport &report, HugeArray<Reference> referenc
 
     start = Clock::now();
     std::vector<Subtree> subtrees(top.remainders.size());
+    Workspaces workspaces(triangles, frame.options, interruption, MAX_SUBTREE_REFERENCES);
     parallel_for(
         uint32_t(subtrees.size()),
         [&](uint32_t i) {
@@ -77,12 +79,13 @@ void build_fast(KdTree &tree, BuildReport &report, HugeArray<Reference> referenc
                 return;
             Remainder &part = top.remainders[i];
             Subtree &subtree = subtrees[i];
-            BinnedMethod method(triangles, frame.options, interruption, part.list.size());
+            auto workspace = workspaces.take_for(part.references.count());
             subtree.arrays.nodes.resize(1);
-            subtree.cost = SubtreeBuilder(method, frame)
+            subtree.cost = SubtreeBuilder(workspace->method, frame)
                                .build(subtree.arrays, subtree.report, 0, part.cell,
-                                      {part.references()}, part.allowance);
-            part.list = {};
+                                      {part.references}, part.allowance);
+            part.list.reset();
+            workspaces.give_back(std::move(workspace));
         },
         [&] { return interruption(); });
     interruption.check();

@@ -25,7 +25,10 @@ public:
         const double area = u * v + length * (u + v);
         base_share_ = float(u * v / area);
         side_share_ = float(length * (u + v) / area);
-        per_half_length_ = float(2 / length);
+        // In two factors: one alone may be infinite.
+        constexpr double TINY = 0x1p-60;
+        enlarge_ = length < TINY ? float(1 / TINY) : 1;
+        per_half_length_ = float(2 / (length * enlarge_));
     }
 
     // Infinite for planes that are not strictly inside the cell.
@@ -33,7 +36,7 @@ public:
                            const FloatPacket &upper_count) const {
         // Halves, whose difference does not overflow.
         const FloatPacket fraction =
-            (position * 0.5f - FloatPacket(lo_ * 0.5f)) * per_half_length_;
+            (position * 0.5f - FloatPacket(lo_ * 0.5f)) * enlarge_ * per_half_length_;
         const FloatPacket lower = fraction * side_share_ + base_share_;
         const FloatPacket upper = (1.0f - fraction) * side_share_ + base_share_;
         const FloatPacket cost =
@@ -47,7 +50,7 @@ public:
 private:
     float traversal_, intersection_, empty_bonus_;
     float lo_, hi_;
-    float base_share_, side_share_, per_half_length_;
+    float base_share_, side_share_, enlarge_, per_half_length_;
 };
 
 } // namespace
@@ -155,14 +158,9 @@ std::vector<PlanarGroup> planar_groups_of_few(const References &references,
             while (group != groups.end() && group->position != position)
                 ++group;
             if (group == groups.end())
-                group = groups.insert(group, PlanarGroup{axis, position, {}, 0, 0});
+                group = groups.insert(group, PlanarGroup{axis, position, {}});
             group->planar.push_back(reference);
         }
-        for (size_t i = first_group; i < groups.size(); ++i)
-            for (const Reference &reference : references.list) {
-                groups[i].below += reference.bounds.lo[axis] < groups[i].position;
-                groups[i].above += reference.bounds.hi[axis] > groups[i].position;
-            }
     }
     return groups;
 }

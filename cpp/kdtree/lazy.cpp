@@ -20,6 +20,9 @@ constexpr uint64_t MAX_TOP_REFERENCES = 262144;
 // step would exceed what is saved. Chosen by measurement.
 constexpr uint64_t MAX_WHOLE_REFERENCES = 64;
 
+// Cells of more references are split before they are dealt out when all is to be built.
+constexpr uint64_t MAX_FINISH_REFERENCES = 32768;
+
 // Room that is reserved for nodes, in proportion to that for references; memory is taken
 // when it is used.
 constexpr uint64_t NODES_PER_REFERENCE = 8;
@@ -30,9 +33,9 @@ LazyGrowth::LazyGrowth(KdTree &tree, const BuildFrame &frame, uint64_t max_cell_
     : options_(frame.options), frame_{options_, frame.scene_area, frame.area_floor},
       triangles_(tree.triangles.begin(), tree.triangles.end()), nodes_(tree.nodes.data()),
       references_(tree.references.data()), max_nodes_(tree.nodes.capacity()),
-      max_references_(tree.references.capacity()),
-      max_cell_references_(max_cell_references), node_count_(tree.nodes.size()),
-      reference_count_(tree.references.size()), seeds_(0, max_nodes_) {}
+      max_references_(tree.references.capacity()), node_count_(tree.nodes.size()),
+      reference_count_(tree.references.size()), seeds_(0, max_nodes_),
+      workspaces_(triangles_, options_, interruption_, max_cell_references) {}
 
 LazyGrowth::~LazyGrowth() {
     for (uint32_t i = 0; i < seed_count_; ++i)
@@ -100,82 +103,94 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
 }
 
 KdNode LazyGrowth::grown(Seed &seed, bool whole) {
-    if (seed.count > max_cell_references_) {
-        BinnedMethod method(triangles_, options_, interruption_, seed.count);
-        SubtreeArrays arrays;
-        return whole_subtree(seed, method, arrays);
-    }
-    std::unique_ptr<Workspace> workspace = take_workspace();
+    std::unique_ptr<Workspace> workspace = workspaces_.take_for(seed.count);
     BinnedMethod &method = workspace->method;
     KdNode node;
+    BuildReport report;
     const BinnedMethod::Contents contents{seed.references()};
     Decision decision;
     whole = whole || seed.count <= MAX_WHOLE_REFERENCES;
     if (!whole)
         decision = decide(method, contents, seed.cell, seed.allowance, frame_);
     if (whole || decision.kind == Decision::Kind::leaf || decision.bad) {
-        node = whole_subtree(seed, method, workspace->arrays);
+        node = whole_subtree(seed, *workspace, report);
     } else {
         const auto [axis, position, planar_below] = decision.plane;
         const Box3f lower_cell = lower_part(seed.cell, axis, position);
         const Box3f upper_cell = upper_part(seed.cell, axis, position);
         const uint64_t children = take_nodes(2);
+        ++report.inner_nodes;
         if (decision.kind == Decision::Kind::empty_cell) {
             const Box3f &full_cell = planar_below ? lower_cell : upper_cell;
             const KdNode full = plant(full_cell, decision.rest, contents);
             nodes_[children] = planar_below ? full : KdNode::leaf(0, 0);
             nodes_[children + 1] = planar_below ? KdNode::leaf(0, 0) : full;
+            ++report.leaves;
+            ++report.empty_leaves;
+            ++report.empty_cell_splits;
         } else {
             BinnedMethod::Parts parts =
                 method.split(contents, seed.cell, decision.plane, false);
             nodes_[children] = plant(lower_cell, decision.rest, parts.lower);
             nodes_[children + 1] = plant(upper_cell, decision.rest, parts.upper);
             method.give_back(parts.kept);
+            report.flat_cell_splits += decision.flat;
+            for (const References &part : {parts.lower, parts.upper}) {
+                report.leaves += part.count() == 0;
+                report.empty_leaves += part.count() == 0;
+            }
         }
         node = KdNode::inner(axis, position, uint32_t(children));
     }
-    give_back(std::move(workspace));
+    workspaces_.give_back(std::move(workspace));
+    const std::lock_guard lock(report_mutex_);
+    report_.add(report);
     return node;
 }
 
-KdNode LazyGrowth::whole_subtree(const Seed &seed, BinnedMethod &method,
-                                 SubtreeArrays &arrays) {
+KdNode LazyGrowth::whole_subtree(const Seed &seed, Workspace &workspace,
+                                 BuildReport &report) {
+    SubtreeArrays &arrays = workspace.arrays;
     arrays.nodes.assign(1, {});
     arrays.references.clear();
-    BuildReport report;
-    SubtreeBuilder(method, frame_)
+    SubtreeBuilder(workspace.method, frame_)
         .build(arrays, report, 0, seed.cell, {seed.references()}, seed.allowance);
     const uint64_t first_node = take_nodes(arrays.nodes.size() - 1);
     const uint64_t first_reference = take_references(arrays.references.size());
     return relocate(arrays, first_node, first_reference, nodes_, references_);
 }
 
-std::unique_ptr<LazyGrowth::Workspace> LazyGrowth::take_workspace() {
-    {
-        const std::lock_guard lock(workspaces_mutex_);
-        if (!workspaces_.empty()) {
-            auto workspace = std::move(workspaces_.back());
-            workspaces_.pop_back();
-            return workspace;
-        }
+std::vector<uint32_t> LazyGrowth::unbuilt_nodes() const {
+    std::vector<uint32_t> unbuilt, pending{0};
+    while (!pending.empty()) {
+        const uint32_t index = pending.back();
+        pending.pop_back();
+        const KdNode node = load_node(nodes_[index]);
+        if (node.is_unbuilt())
+            unbuilt.push_back(index);
+        else if (!node.is_leaf())
+            pending.insert(pending.end(), {node.lower_child() + 1, node.lower_child()});
     }
-    return std::make_unique<Workspace>(Workspace{
-        BinnedMethod(triangles_, options_, interruption_, max_cell_references_), {}});
-}
-
-void LazyGrowth::give_back(std::unique_ptr<Workspace> workspace) {
-    const std::lock_guard lock(workspaces_mutex_);
-    workspaces_.push_back(std::move(workspace));
+    return unbuilt;
 }
 
 void LazyGrowth::finish() {
-    // Nodes that are added meanwhile are finished ones.
-    const uint64_t count = node_count_.load();
-    for_each_chunk(count, Threads::all, [&](uint32_t, uint64_t first, uint64_t last) {
-        for (uint64_t i = first; i < last; ++i)
-            if (load_node(nodes_[i]).is_unbuilt())
-                build(uint32_t(i), true);
-    });
+    // Large cells are split first and finished in a later round, each part by a thread; and
+    // rays of other threads may leave behind new cells.
+    for (;;) {
+        const std::vector<uint32_t> unbuilt = unbuilt_nodes();
+        if (unbuilt.empty())
+            return;
+        parallel_for(uint32_t(unbuilt.size()), [&](uint32_t i) {
+            build(unbuilt[i],
+                  load_node(nodes_[unbuilt[i]]).reference_count() <= MAX_FINISH_REFERENCES);
+        });
+    }
+}
+
+BuildReport LazyGrowth::report() const {
+    const std::lock_guard lock(report_mutex_);
+    return report_;
 }
 
 GrowthState LazyGrowth::state() const {
@@ -212,8 +227,8 @@ void build_lazy(KdTree &tree, BuildReport &report, HugeArray<Reference> referenc
     tree.growth = std::make_shared<LazyGrowth>(tree, frame, MAX_TOP_REFERENCES);
     for (Remainder &part : top.remainders) {
         tree.nodes[part.node] =
-            tree.growth->plant(part.cell, part.allowance, part.references());
-        part.list = {};
+            tree.growth->plant(part.cell, part.allowance, part.references);
+        part.list.reset();
     }
     report.seconds_top = std::chrono::duration<double>(Clock::now() - start).count();
 }

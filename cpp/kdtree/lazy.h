@@ -9,12 +9,11 @@
 // all is built, both trees are equal but for the order of their nodes.
 #pragma once
 
-#include "kdtree/binned_method.h"
 #include "kdtree/builder.h"
 #include "kdtree/subtree.h"
+#include "kdtree/workspaces.h"
 
 #include <atomic>
-#include <deque>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -47,8 +46,11 @@ public:
     // returns it when it is not unbuilt any more.
     KdNode build(uint32_t index, bool whole);
 
-    // Builds all that is not built, by all threads.
+    // Builds all that is not built, by all threads, whatever others ask for meanwhile.
     void finish();
+
+    // What was done since the tree was made; the figures of the whole tree are missing.
+    BuildReport report() const;
 
     GrowthState state() const;
 
@@ -67,15 +69,9 @@ private:
         References references() const { return {{list.get(), count}, bounds}; }
     };
 
-    struct Workspace {
-        BinnedMethod method;
-        SubtreeArrays arrays;
-    };
-
     KdNode grown(Seed &seed, bool whole);
-    KdNode whole_subtree(const Seed &seed, BinnedMethod &method, SubtreeArrays &arrays);
-    std::unique_ptr<Workspace> take_workspace();
-    void give_back(std::unique_ptr<Workspace> workspace);
+    KdNode whole_subtree(const Seed &seed, Workspace &workspace, BuildReport &report);
+    std::vector<uint32_t> unbuilt_nodes() const;
 
     BuildOptions options_;
     BuildFrame frame_;
@@ -84,14 +80,15 @@ private:
     std::span<const Triangle> triangles_;
     KdNode *nodes_;
     uint32_t *references_;
-    uint64_t max_nodes_, max_references_, max_cell_references_;
+    uint64_t max_nodes_, max_references_;
     std::atomic<uint64_t> node_count_, reference_count_;
     std::atomic<uint64_t> unbuilt_cells_{0}, unbuilt_references_{0};
 
     HugeArray<Seed *> seeds_; // by number
     std::atomic<uint32_t> seed_count_{0};
-    std::mutex workspaces_mutex_;
-    std::vector<std::unique_ptr<Workspace>> workspaces_;
+    Workspaces workspaces_;
+    mutable std::mutex report_mutex_;
+    BuildReport report_;
 
 public:
     ~LazyGrowth();

@@ -1,7 +1,6 @@
 #include "kdtree/partition.h"
 
-#include "geometry/clip.h"
-#include "kdtree/sah.h"
+#include "kdtree/cut_reference.h"
 
 #include <cstring>
 #include <vector>
@@ -9,11 +8,6 @@
 namespace mlrt {
 
 namespace {
-
-// Both parts of a reference that a plane cuts; a part may be empty.
-struct CutReference {
-    Box3f lower, upper;
-};
 
 // Appends to lists with room enough. `on_cut` gives the two parts of what is cut.
 struct Writer {
@@ -28,7 +22,7 @@ struct Writer {
             const bool below = reference.bounds.lo[axis] < position;
             const bool above = reference.bounds.hi[axis] > position;
             if (below && above) {
-                const CutReference parts = on_cut(reference);
+                const ClippedHalves parts = on_cut(reference);
                 if (!parts.lower.empty()) {
                     *lower++ = {parts.lower, reference.triangle};
                     add_bounds(lower_bounds, parts.lower);
@@ -50,24 +44,17 @@ struct Writer {
 
 } // namespace
 
-Box3f Partitioner::part_in(const Reference &reference, const Box3f &child) const {
-    Box3f part = clip_ ? clip_triangle(triangles_[reference.triangle], child) : child;
-    // Also within what was known before: bounds only ever shrink.
-    for (int k = 0; k < 3; ++k) {
-        part.lo[k] = std::max(part.lo[k], reference.bounds.lo[k]);
-        part.hi[k] = std::min(part.hi[k], reference.bounds.hi[k]);
-    }
-    return part.empty() ? Box3f{} : part;
+ClippedHalves Partitioner::cut(const Reference &reference, const Box3f &cell,
+                               const SplitPlane &plane) const {
+    return parts_of(reference, triangles_[reference.triangle], cell, plane, clip_);
 }
 
 Halves Partitioner::split(const References &references, const Box3f &cell,
                           const SplitPlane &plane, Reference *room) const {
-    const Box3f lower_cell = lower_part(cell, plane.axis, plane.position);
-    const Box3f upper_cell = upper_part(cell, plane.axis, plane.position);
     Reference *const upper_room = room + references.count();
     Writer writer{room, upper_room, {}, {}};
     writer.distribute(references.list, plane, [&](const Reference &reference) {
-        return CutReference{part_in(reference, lower_cell), part_in(reference, upper_cell)};
+        return cut(reference, cell, plane);
     });
     return {{{room, writer.lower}, writer.lower_bounds},
             {{upper_room, writer.upper}, writer.upper_bounds}};
@@ -75,13 +62,12 @@ Halves Partitioner::split(const References &references, const Box3f &cell,
 
 Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &references,
                                                            const Box3f &cell,
-                                                           const SplitPlane &plane) const {
+                                                           const SplitPlane &plane,
+                                                           const Allocate &allocate) const {
     const auto [axis, position, planar_below] = plane;
-    const Box3f lower_cell = lower_part(cell, axis, position);
-    const Box3f upper_cell = upper_part(cell, axis, position);
     struct Part {
         uint64_t lower_count = 0, upper_count = 0;
-        std::vector<CutReference> cut;
+        std::vector<ClippedHalves> cut;
         Box3f lower_bounds, upper_bounds;
     };
     const uint64_t count = references.count();
@@ -94,11 +80,10 @@ Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &ref
             const bool below = reference.bounds.lo[axis] < position;
             const bool above = reference.bounds.hi[axis] > position;
             if (below && above) {
-                const CutReference cut{part_in(reference, lower_cell),
-                                       part_in(reference, upper_cell)};
-                part.lower_count += !cut.lower.empty();
-                part.upper_count += !cut.upper.empty();
-                part.cut.push_back(cut);
+                const ClippedHalves halves = cut(reference, cell, plane);
+                part.lower_count += !halves.lower.empty();
+                part.upper_count += !halves.upper.empty();
+                part.cut.push_back(halves);
             } else {
                 const bool to_upper = above || (!below && !planar_below);
                 part.lower_count += !to_upper;
@@ -113,14 +98,14 @@ Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &ref
         lower_count += part.lower_count;
         upper_count += part.upper_count;
     }
-    OwnHalves halves{
-        HugeArray<Reference>(lower_count), HugeArray<Reference>(upper_count), {}, {}};
+    OwnHalves halves;
+    halves.list = allocate(lower_count + upper_count);
+    Reference *const lower = halves.list->data(), *const upper = lower + lower_count;
+    halves.lower.list = {lower, lower_count};
+    halves.upper.list = {upper, upper_count};
     for_each_chunk(count, Threads::all, [&](uint32_t chunk, uint64_t first, uint64_t last) {
         Part &part = parts[chunk];
-        Writer writer{halves.lower.data() + starts[chunk].first,
-                      halves.upper.data() + starts[chunk].second,
-                      {},
-                      {}};
+        Writer writer{lower + starts[chunk].first, upper + starts[chunk].second, {}, {}};
         auto next_cut = part.cut.begin();
         writer.distribute(references.list.subspan(first, last - first), plane,
                           [&](const Reference &) { return *next_cut++; });
@@ -128,8 +113,8 @@ Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &ref
         part.upper_bounds = writer.upper_bounds;
     });
     for (const Part &part : parts) {
-        add_bounds(halves.lower_bounds, part.lower_bounds);
-        add_bounds(halves.upper_bounds, part.upper_bounds);
+        add_bounds(halves.lower.bounds, part.lower_bounds);
+        add_bounds(halves.upper.bounds, part.upper_bounds);
     }
     return halves;
 }

@@ -2,10 +2,13 @@
 #pragma once
 
 #include "base/huge_array.h"
+#include "geometry/clip.h"
 #include "geometry/triangle.h"
 #include "kdtree/chunks.h"
 #include "kdtree/reference.h"
 
+#include <functional>
+#include <memory>
 #include <span>
 
 namespace mlrt {
@@ -27,17 +30,19 @@ public:
     Halves split(const References &references, const Box3f &cell, const SplitPlane &plane,
                  Reference *room) const;
 
-    // The same with all threads, into arrays of their own.
-    struct OwnHalves {
-        HugeArray<Reference> lower, upper;
-        Box3f lower_bounds, upper_bounds;
+    // The same with all threads, into an array that `allocate` gives for a number of
+    // references.
+    struct OwnHalves : Halves {
+        std::shared_ptr<HugeArray<Reference>> list;
     };
+    using Allocate = std::function<std::shared_ptr<HugeArray<Reference>>(uint64_t)>;
     OwnHalves split_with_all_threads(const References &references, const Box3f &cell,
-                                     const SplitPlane &plane) const;
+                                     const SplitPlane &plane,
+                                     const Allocate &allocate) const;
 
 private:
-    // Bounds of a reference in a child, empty if it does not reach into it.
-    Box3f part_in(const Reference &reference, const Box3f &child) const;
+    ClippedHalves cut(const Reference &reference, const Box3f &cell,
+                      const SplitPlane &plane) const;
 
     std::span<const Triangle> triangles_;
     bool clip_;

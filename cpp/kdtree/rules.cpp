@@ -75,12 +75,12 @@ bool covers(const PlanarGroup &group, const Box3f &cell,
     return uncovered_area(section, flat, tolerance) <= tolerance;
 }
 
-Candidate flat_cell(const PlanarGroup &group, const Box3f &cell,
-                    const BuildOptions &options) {
-    const double below = double(group.position) - double(cell.lo[group.axis]);
-    const double above = double(cell.hi[group.axis]) - double(group.position);
+Candidate flat_cell(const PlanarGroup &group, uint64_t below, uint64_t above,
+                    const Box3f &cell, const BuildOptions &options) {
+    const double lower_extent = double(group.position) - double(cell.lo[group.axis]);
+    const double upper_extent = double(cell.hi[group.axis]) - double(group.position);
     Candidate candidate{
-        {group.axis, group.position, below <= above}, group.below, group.above, 0};
+        {group.axis, group.position, lower_extent <= upper_extent}, below, above, 0};
     (candidate.plane.planar_below ? candidate.lower_count : candidate.upper_count) +=
         group.planar.size();
     candidate.cost = SplitCost(options, cell, group.axis)(

@@ -24,7 +24,6 @@ struct PlanarGroup {
     int axis;
     float position;
     std::vector<Reference> planar;
-    uint64_t below, above; // other references that reach below, above the plane
 };
 
 // Whether those of the group's triangles that lie in the plane as a whole cover all of the
@@ -39,8 +38,9 @@ double cover_limit(const Box3f &cell, int axis, double sum_of_bounds);
 // Rule 2: the plane of a group that covers the cell; its triangles go to the smaller child,
 // the lower one if both are equal. A cell of no extent along an axis has no such plane, so
 // no path has two flat cells along one axis.
-Candidate flat_cell(const PlanarGroup &group, const Box3f &cell,
-                    const BuildOptions &options);
+// `below` and `above` are the other references that reach there.
+Candidate flat_cell(const PlanarGroup &group, uint64_t below, uint64_t above,
+                    const Box3f &cell, const BuildOptions &options);
 
 // Area of the reference's bounds across an axis.
 inline double area_across(const Box3f &bounds, int axis) {

@@ -10,7 +10,7 @@ namespace mlrt {
 // Trees of another number are not taken for those that would be built now. To be raised
 // whenever a builder gives another tree for the same triangles and options, or when the
 // layout of a node changes.
-inline constexpr uint32_t BUILDER_VERSION = 1;
+inline constexpr uint32_t BUILDER_VERSION = 2;
 
 // Makes a tree of arrays that were stored: nodes, references, and the triangles that they
 // were built for. Bounds and depth are found anew.

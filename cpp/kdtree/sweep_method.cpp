@@ -8,7 +8,7 @@ namespace {
 constexpr uint64_t MAX_KEPT_REFERENCES = 4096;
 
 PlanarGroup group_of(const PlanarEvents &events, const CellContents &contents) {
-    PlanarGroup group{events.axis, events.position, {}, events.below, events.above};
+    PlanarGroup group{events.axis, events.position, {}};
     group.planar.reserve(events.count);
     for (size_t i = 0; i < events.count; ++i)
         group.planar.push_back(
@@ -53,7 +53,8 @@ std::optional<Choice> SweepMethod::choose(const Contents &contents, const Box3f 
             const PlanarGroup group = group_of(events, contents);
             if (!covers(group, cell, triangles_))
                 continue;
-            const Candidate candidate = flat_cell(group, cell, options_);
+            const Candidate candidate =
+                flat_cell(group, events.below, events.above, cell, options_);
             if (!flat || is_cheaper(candidate.cost, flat->cost))
                 flat = candidate;
         }

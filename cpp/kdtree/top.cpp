@@ -22,6 +22,34 @@ struct TopMethod {
     }
 };
 
+// Arrays that are not needed any more, for those that will be: their pages are in place.
+class SpareArrays {
+public:
+    using Array = std::shared_ptr<HugeArray<Reference>>;
+
+    Array take(uint64_t count) {
+        auto best = spare_.end();
+        for (auto i = spare_.begin(); i != spare_.end(); ++i)
+            if ((*i)->capacity() >= count &&
+                (best == spare_.end() || (*i)->capacity() < (*best)->capacity()))
+                best = i;
+        if (best == spare_.end())
+            return std::make_shared<HugeArray<Reference>>(count);
+        Array array = std::move(*best);
+        spare_.erase(best);
+        return array;
+    }
+
+    // Keeps the array if nobody else needs it.
+    void give_back(Array array) {
+        if (array.use_count() == 1)
+            spare_.push_back(std::move(array));
+    }
+
+private:
+    std::vector<Array> spare_;
+};
+
 } // namespace
 
 Top build_top(HugeArray<Reference> references, const Box3f &bounds,
@@ -32,8 +60,12 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
     const Partitioner partitioner(triangles, frame.options.clip);
     Top top;
     top.cells.push_back(bounds);
+    SpareArrays spare;
+    const auto allocate = [&](uint64_t count) { return spare.take(count); };
     std::vector<Remainder> pending;
-    pending.push_back({0, bounds, allowance, std::move(references), bounds});
+    auto all = std::make_shared<HugeArray<Reference>>(std::move(references));
+    const References whole{{all->begin(), all->end()}, bounds};
+    pending.push_back({0, bounds, allowance, whole, std::move(all)});
     const auto add_node = [&](const Box3f &cell) {
         top.nodes.push_back({});
         top.cells.push_back(cell);
@@ -44,9 +76,9 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
         Remainder current = std::move(pending.back());
         pending.pop_back();
         Decision decision;
-        if (current.list.size() > max_references)
-            decision = decide(method, current.references(), current.cell, current.allowance,
-                              frame);
+        if (current.references.count() > max_references)
+            decision =
+                decide(method, current.references, current.cell, current.allowance, frame);
         // What ends here for good, and what may be taken back, is left to who builds
         // subtrees.
         if (decision.kind == Decision::Kind::leaf || decision.bad) {
@@ -67,17 +99,16 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
             top.nodes[planar_below ? upper : lower] = KdNode::leaf(0, 0);
             pending.push_back({planar_below ? lower : upper,
                                planar_below ? lower_cell : upper_cell, decision.rest,
-                               std::move(current.list), current.bounds});
+                               current.references, std::move(current.list)});
             continue;
         }
         top.report.flat_cell_splits += decision.flat;
         Partitioner::OwnHalves halves = partitioner.split_with_all_threads(
-            current.references(), current.cell, decision.plane);
+            current.references, current.cell, decision.plane, allocate);
+        spare.give_back(std::move(current.list));
         // The lower one is taken first.
-        pending.push_back({upper, upper_cell, decision.rest, std::move(halves.upper),
-                           halves.upper_bounds});
-        pending.push_back({lower, lower_cell, decision.rest, std::move(halves.lower),
-                           halves.lower_bounds});
+        pending.push_back({upper, upper_cell, decision.rest, halves.upper, halves.list});
+        pending.push_back({lower, lower_cell, decision.rest, halves.lower, halves.list});
     }
     return top;
 }

@@ -16,10 +16,8 @@ struct Remainder {
     uint32_t node; // of the upper part
     Box3f cell;
     Allowance allowance;
-    HugeArray<Reference> list;
-    Box3f bounds;
-
-    References references() const { return {{list.begin(), list.end()}, bounds}; }
+    References references;
+    std::shared_ptr<HugeArray<Reference>> list; // that the references lie in
 };
 
 struct Top {

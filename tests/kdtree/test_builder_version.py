@@ -18,8 +18,8 @@ OPTIONS: tuple[dict[str, Any], ...] = (
     {"clip": False},
     {"rule_flat_cell": False, "empty_bonus": 0.5},
 )
-VERSION = 1
-DIGEST = "10a17a562d718d017c9e2b805d320645e496fe79375a10feff7c1ed26ce30404"
+VERSION = 2
+DIGEST = "3537160cc14cba9843f0bb06c2dc927d0b2d361ed9ae84d3d89936662cb6eca3"
 
 
 def test_the_version_tells_what_is_built() -> None:
