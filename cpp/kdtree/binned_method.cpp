@@ -2,6 +2,36 @@
 
 namespace mlrt {
 
+namespace {
+
+struct Around {
+    uint64_t below = 0, above = 0;
+};
+
+// References that reach below and above the plane of a group.
+Around count_around(const PlanarGroup &group, const References &references,
+                    Threads threads) {
+    std::vector<Around> parts(chunk_count(references.count()));
+    for_each_chunk(references.count(), threads,
+                   [&](uint32_t chunk, uint64_t first, uint64_t last) {
+                       Around part;
+                       for (uint64_t i = first; i < last; ++i) {
+                           const Box3f &bounds = references.list[i].bounds;
+                           part.below += bounds.lo[group.axis] < group.position;
+                           part.above += bounds.hi[group.axis] > group.position;
+                       }
+                       parts[chunk] = part;
+                   });
+    Around sum;
+    for (const Around &part : parts) {
+        sum.below += part.below;
+        sum.above += part.above;
+    }
+    return sum;
+}
+
+} // namespace
+
 std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
                                   std::span<const Triangle> triangles,
                                   const BuildOptions &options, Threads threads) {
@@ -14,11 +44,7 @@ std::optional<Choice> choose_fast(const References &references, const Box3f &cel
         for (const PlanarGroup &group :
              few ? planar_groups_of_few(references, cell) : bins->planar_groups())
             if (covers(group, cell, triangles)) {
-                uint64_t below = 0, above = 0;
-                for (const Reference &reference : references.list) {
-                    below += reference.bounds.lo[group.axis] < group.position;
-                    above += reference.bounds.hi[group.axis] > group.position;
-                }
+                const auto [below, above] = count_around(group, references, threads);
                 const Candidate candidate = flat_cell(group, below, above, cell, options);
                 if (!flat || is_cheaper(candidate.cost, flat->cost))
                     flat = candidate;

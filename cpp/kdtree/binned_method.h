@@ -15,6 +15,23 @@ std::optional<Choice> choose_fast(const References &references, const Box3f &cel
                                   std::span<const Triangle> triangles,
                                   const BuildOptions &options, Threads threads);
 
+// The fast method as far as `decide` needs it, for lists of any size.
+struct FastChoice {
+    using Contents = References;
+
+    std::span<const Triangle> triangles;
+    const BuildOptions &options;
+    Threads threads;
+
+    std::optional<SplitPlane> largest_empty_part(const References &contents,
+                                                 const Box3f &cell) const {
+        return mlrt::largest_empty_part(contents.bounds, cell, options);
+    }
+    std::optional<Choice> choose(const References &contents, const Box3f &cell) const {
+        return choose_fast(contents, cell, triangles, options, threads);
+    }
+};
+
 class BinnedMethod {
 public:
     // References in a list of somebody else or on the stack.
@@ -48,6 +65,12 @@ public:
     void for_each_triangle(const Contents &contents, Visit &&visit) const {
         for (const Reference &reference : contents.list)
             visit(reference.triangle);
+    }
+
+    // Room for the parts of `count` references, while the stack is empty.
+    Reference *room_for(uint64_t count) {
+        MLRT_CHECK(stack_.empty() && 2 * count <= stack_.capacity());
+        return stack_.data();
     }
 
     Contents nothing() const { return {}; }

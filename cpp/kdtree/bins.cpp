@@ -200,9 +200,26 @@ std::optional<Candidate> Bins::best_plane(const BuildOptions &options) const {
     return best.candidate();
 }
 
+template <typename T, typename Collect>
+std::vector<T> Bins::gather(Collect &&collect) const {
+    std::vector<T> all;
+    const uint64_t count = references_.count();
+    if (count <= CHUNK) {
+        collect(0, count, all);
+        return all;
+    }
+    std::vector<std::vector<T>> parts(chunk_count(count));
+    for_each_chunk(count, threads_, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+        collect(first, last, parts[chunk]);
+    });
+    for (const std::vector<T> &part : parts)
+        all.insert(all.end(), part.begin(), part.end());
+    return all;
+}
+
 std::vector<Event> Bins::events_within(int axis, int bin) const {
     const BinGrid::Interval interval = grid_.interval(axis, bin, bin_count_);
-    const auto gather = [&](uint64_t first, uint64_t last, std::vector<Event> &events) {
+    return gather<Event>([&](uint64_t first, uint64_t last, std::vector<Event> &events) {
         for (uint64_t i = first; i < last; ++i) {
             const Box3f &bounds = references_.list[i].bounds;
             const float lo = bounds.lo[axis], hi = bounds.hi[axis];
@@ -211,20 +228,7 @@ std::vector<Event> Bins::events_within(int axis, int bin) const {
             if (lo != hi && interval.contains(hi))
                 events.emplace_back(hi, EventType::end, 0);
         }
-    };
-    std::vector<Event> events;
-    const uint64_t count = references_.count();
-    if (count <= CHUNK) {
-        gather(0, count, events);
-        return events;
-    }
-    std::vector<std::vector<Event>> parts(chunk_count(count));
-    for_each_chunk(count, threads_, [&](uint32_t chunk, uint64_t first, uint64_t last) {
-        gather(first, last, parts[chunk]);
     });
-    for (const std::vector<Event> &part : parts)
-        events.insert(events.end(), part.begin(), part.end());
-    return events;
 }
 
 std::vector<PlanarGroup> Bins::planar_groups() const {
@@ -240,7 +244,6 @@ std::vector<PlanarGroup> Bins::planar_groups() const {
                    (position == other.position && number < other.number);
         }
     };
-    std::vector<Flat> flats;
     for (int axis = 0; axis < 3; ++axis) {
         std::array<bool, MAX_BINS> full{};
         bool any_full = false;
@@ -251,13 +254,15 @@ std::vector<PlanarGroup> Bins::planar_groups() const {
             }
         if (!any_full)
             continue;
-        flats.clear();
-        for (uint32_t i = 0; i < references_.count(); ++i) {
-            const Box3f &bounds = references_.list[i].bounds;
-            if (bounds.lo[axis] == bounds.hi[axis] &&
-                full[grid_.index(axis, bounds.lo[axis])])
-                flats.push_back({bounds.lo[axis], i});
-        }
+        std::vector<Flat> flats =
+            gather<Flat>([&](uint64_t first, uint64_t last, std::vector<Flat> &found) {
+                for (uint64_t i = first; i < last; ++i) {
+                    const Box3f &bounds = references_.list[i].bounds;
+                    if (bounds.lo[axis] == bounds.hi[axis] &&
+                        full[grid_.index(axis, bounds.lo[axis])])
+                        found.push_back({bounds.lo[axis], uint32_t(i)});
+                }
+            });
         std::sort(flats.begin(), flats.end());
         for (size_t first = 0, last = 0; first < flats.size(); first = last) {
             const float position = flats[first].position;

@@ -81,6 +81,10 @@ public:
 
 private:
     void count_range(uint64_t first, uint64_t last, Counts &counts) const;
+    // What collect(first, last, found) adds to `found` for ranges of the references, in
+    // their order.
+    template <typename T, typename Collect>
+    std::vector<T> gather(Collect &&collect) const;
     // Events of the references in a bin, in any order.
     std::vector<Event> events_within(int axis, int bin) const;
 

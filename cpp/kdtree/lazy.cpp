@@ -14,7 +14,7 @@ namespace {
 
 // Cells of more references are split before the first ray comes, by all threads together:
 // any ray enters one of the few, and others would wait for it.
-constexpr uint64_t MAX_TOP_REFERENCES = 262144;
+constexpr uint64_t MAX_TOP_REFERENCES = 1 << 20;
 
 // Cells of up to this many references are built at once: the time to split them step by
 // step would exceed what is saved. Chosen by measurement.
@@ -23,19 +23,23 @@ constexpr uint64_t MAX_WHOLE_REFERENCES = 64;
 // Cells of more references are split before they are dealt out when all is to be built.
 constexpr uint64_t MAX_FINISH_REFERENCES = 32768;
 
+// Parts of larger cells stay in the list that they are split into.
+constexpr uint64_t MAX_COPIED_REFERENCES = 32768;
+
 // Room that is reserved for nodes, in proportion to that for references; memory is taken
 // when it is used.
 constexpr uint64_t NODES_PER_REFERENCE = 8;
 
 } // namespace
 
-LazyGrowth::LazyGrowth(KdTree &tree, const BuildFrame &frame, uint64_t max_cell_references)
+LazyGrowth::LazyGrowth(KdTree &tree, const BuildFrame &frame)
     : options_(frame.options), frame_{options_, frame.scene_area, frame.area_floor},
-      triangles_(tree.triangles.begin(), tree.triangles.end()), nodes_(tree.nodes.data()),
+      triangles_(tree.triangles.begin(), tree.triangles.end()),
+      partitioner_(triangles_, options_.clip), nodes_(tree.nodes.data()),
       references_(tree.references.data()), max_nodes_(tree.nodes.capacity()),
       max_references_(tree.references.capacity()), node_count_(tree.nodes.size()),
       reference_count_(tree.references.size()), seeds_(0, max_nodes_),
-      workspaces_(triangles_, options_, interruption_, max_cell_references) {}
+      workspaces_(triangles_, options_, interruption_, MAX_COPIED_REFERENCES) {}
 
 LazyGrowth::~LazyGrowth() {
     for (uint32_t i = 0; i < seed_count_; ++i)
@@ -43,17 +47,21 @@ LazyGrowth::~LazyGrowth() {
 }
 
 KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
-                         const References &contents) {
+                         const References &contents, SharedList list) {
     const uint64_t count = contents.count();
     if (count == 0)
         return KdNode::leaf(0, 0);
     auto seed = std::make_unique<Seed>();
     seed->cell = cell;
     seed->allowance = allowance;
-    seed->bounds = contents.bounds;
-    seed->count = uint32_t(count);
-    seed->list = std::make_unique_for_overwrite<Reference[]>(count);
-    std::copy(contents.list.begin(), contents.list.end(), seed->list.get());
+    seed->references = contents;
+    if (list) {
+        seed->shared_list = std::move(list);
+    } else {
+        seed->own_list = std::make_unique_for_overwrite<Reference[]>(count);
+        std::copy(contents.list.begin(), contents.list.end(), seed->own_list.get());
+        seed->references.list = {seed->own_list.get(), count};
+    }
     const uint32_t number = seed_count_.fetch_add(1);
     seeds_[number] = seed.release();
     unbuilt_cells_.fetch_add(1, std::memory_order_relaxed);
@@ -89,9 +97,10 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
     try {
         const KeepDenormals keep_denormals;
         publish_node(nodes_[index], grown(seed, whole));
-        seed.list.reset();
+        seed.own_list.reset();
+        seed.shared_list.reset();
         unbuilt_cells_.fetch_sub(1, std::memory_order_relaxed);
-        unbuilt_references_.fetch_sub(seed.count, std::memory_order_relaxed);
+        unbuilt_references_.fetch_sub(seed.count(), std::memory_order_relaxed);
     } catch (...) {
         seed.error = std::current_exception();
     }
@@ -103,17 +112,15 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
 }
 
 KdNode LazyGrowth::grown(Seed &seed, bool whole) {
-    std::unique_ptr<Workspace> workspace = workspaces_.take_for(seed.count);
-    BinnedMethod &method = workspace->method;
     KdNode node;
     BuildReport report;
-    const BinnedMethod::Contents contents{seed.references()};
+    FastChoice method{triangles_, options_, Threads::one};
     Decision decision;
-    whole = whole || seed.count <= MAX_WHOLE_REFERENCES;
+    whole = whole || seed.count() <= MAX_WHOLE_REFERENCES;
     if (!whole)
-        decision = decide(method, contents, seed.cell, seed.allowance, frame_);
+        decision = decide(method, seed.references, seed.cell, seed.allowance, frame_);
     if (whole || decision.kind == Decision::Kind::leaf || decision.bad) {
-        node = whole_subtree(seed, *workspace, report);
+        node = whole_subtree(seed, report);
     } else {
         const auto [axis, position, planar_below] = decision.plane;
         const Box3f lower_cell = lower_part(seed.cell, axis, position);
@@ -122,42 +129,53 @@ KdNode LazyGrowth::grown(Seed &seed, bool whole) {
         ++report.inner_nodes;
         if (decision.kind == Decision::Kind::empty_cell) {
             const Box3f &full_cell = planar_below ? lower_cell : upper_cell;
-            const KdNode full = plant(full_cell, decision.rest, contents);
+            const KdNode full =
+                plant(full_cell, decision.rest, seed.references, seed.shared_list);
             nodes_[children] = planar_below ? full : KdNode::leaf(0, 0);
             nodes_[children + 1] = planar_below ? KdNode::leaf(0, 0) : full;
             ++report.leaves;
             ++report.empty_leaves;
             ++report.empty_cell_splits;
         } else {
-            BinnedMethod::Parts parts =
-                method.split(contents, seed.cell, decision.plane, false);
-            nodes_[children] = plant(lower_cell, decision.rest, parts.lower);
-            nodes_[children + 1] = plant(upper_cell, decision.rest, parts.upper);
-            method.give_back(parts.kept);
+            const bool large = seed.count() > MAX_COPIED_REFERENCES;
+            std::unique_ptr<Workspace> workspace;
+            std::shared_ptr<HugeArray<Reference>> list;
+            if (large)
+                list = std::make_shared<HugeArray<Reference>>(2 * seed.count());
+            else
+                workspace = workspaces_.take_for(seed.count());
+            const Halves halves = partitioner_.split(
+                seed.references, seed.cell, decision.plane,
+                large ? list->data() : workspace->method.room_for(seed.count()));
+            nodes_[children] = plant(lower_cell, decision.rest, halves.lower, list);
+            nodes_[children + 1] = plant(upper_cell, decision.rest, halves.upper, list);
+            if (workspace)
+                workspaces_.give_back(std::move(workspace));
             report.flat_cell_splits += decision.flat;
-            for (const References &part : {parts.lower, parts.upper}) {
+            for (const References &part : {halves.lower, halves.upper}) {
                 report.leaves += part.count() == 0;
                 report.empty_leaves += part.count() == 0;
             }
         }
         node = KdNode::inner(axis, position, uint32_t(children));
     }
-    workspaces_.give_back(std::move(workspace));
     const std::lock_guard lock(report_mutex_);
     report_.add(report);
     return node;
 }
 
-KdNode LazyGrowth::whole_subtree(const Seed &seed, Workspace &workspace,
-                                 BuildReport &report) {
-    SubtreeArrays &arrays = workspace.arrays;
+KdNode LazyGrowth::whole_subtree(const Seed &seed, BuildReport &report) {
+    std::unique_ptr<Workspace> workspace = workspaces_.take_for(seed.count());
+    SubtreeArrays &arrays = workspace->arrays;
     arrays.nodes.assign(1, {});
     arrays.references.clear();
-    SubtreeBuilder(workspace.method, frame_)
-        .build(arrays, report, 0, seed.cell, {seed.references()}, seed.allowance);
+    SubtreeBuilder(workspace->method, frame_)
+        .build(arrays, report, 0, seed.cell, {seed.references}, seed.allowance);
     const uint64_t first_node = take_nodes(arrays.nodes.size() - 1);
     const uint64_t first_reference = take_references(arrays.references.size());
-    return relocate(arrays, first_node, first_reference, nodes_, references_);
+    const KdNode root = relocate(arrays, first_node, first_reference, nodes_, references_);
+    workspaces_.give_back(std::move(workspace));
+    return root;
 }
 
 std::vector<uint32_t> LazyGrowth::unbuilt_nodes() const {
@@ -224,10 +242,10 @@ void build_lazy(KdTree &tree, BuildReport &report, HugeArray<Reference> referenc
         top.nodes.size(),
         std::min<uint64_t>(KdNode::MAX_NODES, NODES_PER_REFERENCE * max_references));
     std::copy(top.nodes.begin(), top.nodes.end(), tree.nodes.begin());
-    tree.growth = std::make_shared<LazyGrowth>(tree, frame, MAX_TOP_REFERENCES);
+    tree.growth = std::make_shared<LazyGrowth>(tree, frame);
     for (Remainder &part : top.remainders) {
         tree.nodes[part.node] =
-            tree.growth->plant(part.cell, part.allowance, part.references);
+            tree.growth->plant(part.cell, part.allowance, part.references, part.list);
         part.list.reset();
     }
     report.seconds_top = std::chrono::duration<double>(Clock::now() - start).count();

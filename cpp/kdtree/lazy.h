@@ -33,10 +33,15 @@ struct GrowthState {
 class LazyGrowth {
 public:
     // For the tree whose arrays are given, with all their capacity.
-    LazyGrowth(KdTree &tree, const BuildFrame &frame, uint64_t max_cell_references);
+    LazyGrowth(KdTree &tree, const BuildFrame &frame);
 
-    // A node in whose place the given references are to be built.
-    KdNode plant(const Box3f &cell, const Allowance &allowance, const References &contents);
+    // A list that several cells have parts of.
+    using SharedList = std::shared_ptr<const HugeArray<Reference>>;
+
+    // A node in whose place the given references are to be built. They are copied, unless
+    // the list that they lie in is given.
+    KdNode plant(const Box3f &cell, const Allowance &allowance, const References &contents,
+                 SharedList list = nullptr);
 
     // Room for `count` nodes or references behind those in use. Throws std::length_error.
     uint64_t take_nodes(uint64_t count);
@@ -59,18 +64,19 @@ private:
     struct Seed {
         Box3f cell;
         Allowance allowance;
-        Box3f bounds;
-        std::unique_ptr<Reference[]> list;
-        uint32_t count = 0;
+        References references;
+        // One of both holds the references.
+        std::unique_ptr<Reference[]> own_list;
+        SharedList shared_list;
         std::atomic<bool> claimed{false};
         std::atomic<bool> finished{false};
         std::exception_ptr error;
 
-        References references() const { return {{list.get(), count}, bounds}; }
+        uint64_t count() const { return references.count(); }
     };
 
     KdNode grown(Seed &seed, bool whole);
-    KdNode whole_subtree(const Seed &seed, Workspace &workspace, BuildReport &report);
+    KdNode whole_subtree(const Seed &seed, BuildReport &report);
     std::vector<uint32_t> unbuilt_nodes() const;
 
     BuildOptions options_;
@@ -78,6 +84,7 @@ private:
     std::function<bool()> never_cancelled_;
     Interruption interruption_{never_cancelled_};
     std::span<const Triangle> triangles_;
+    Partitioner partitioner_;
     KdNode *nodes_;
     uint32_t *references_;
     uint64_t max_nodes_, max_references_;

@@ -6,22 +6,6 @@ namespace mlrt {
 
 namespace {
 
-// The fast method with all threads at once, as far as `decide` needs it.
-struct TopMethod {
-    using Contents = References;
-
-    std::span<const Triangle> triangles;
-    const BuildOptions &options;
-
-    std::optional<SplitPlane> largest_empty_part(const References &contents,
-                                                 const Box3f &cell) const {
-        return mlrt::largest_empty_part(contents.bounds, cell, options);
-    }
-    std::optional<Choice> choose(const References &contents, const Box3f &cell) const {
-        return choose_fast(contents, cell, triangles, options, Threads::all);
-    }
-};
-
 // Arrays that are not needed any more, for those that will be: their pages are in place.
 class SpareArrays {
 public:
@@ -56,7 +40,7 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
               std::span<const Triangle> triangles, const Allowance &allowance,
               const BuildFrame &frame, uint64_t max_references,
               const Interruption &interruption) {
-    TopMethod method{triangles, frame.options};
+    FastChoice method{triangles, frame.options, Threads::all};
     const Partitioner partitioner(triangles, frame.options.clip);
     Top top;
     top.cells.push_back(bounds);
