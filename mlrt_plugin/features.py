@@ -7,7 +7,7 @@ from typing import Any
 
 from .elements import Element
 from .errors import UnsupportedFeature
-from .options import TRACE_OPTIONS
+from .options import INTEGRATOR_OPTIONS
 from .scene_arrays import Feature, Lighting
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
@@ -23,7 +23,12 @@ NO_BSDF_SAMPLES = (
     "BSDF samples are not taken, so area lights are noisier or less noisy than in Mitsuba; "
     "the expected image is the same"
 )
-OWN_PARAMETERS = ("hide_emitters", "emitter_samples", "bsdf_samples", *TRACE_OPTIONS)
+OWN_PARAMETERS = (
+    "hide_emitters",
+    "emitter_samples",
+    "bsdf_samples",
+    *INTEGRATOR_OPTIONS,
+)
 """Parameters of the integrator `mlrt`."""
 
 NATIVE = {

@@ -1,8 +1,9 @@
 """The plugin ``<integrator type="mlrt">``.
 
 It is known to Mitsuba as soon as this package is imported, in the variant that is set and
-in all that are set later. Its parameters are `hide_emitters`, and the options of tracing
-that `mlrt_plugin.options` lists.
+in all that are set later. Its parameters are `hide_emitters`, and the options of building
+and tracing in `mlrt_plugin.options.INTEGRATOR_OPTIONS`; they change the time that is taken,
+never the image.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import UnsupportedFeature
-from .options import TRACE_OPTIONS
+from .options import INTEGRATOR_OPTIONS
 from .render import PreparedScene, prepare
 from .scene_arrays import Lighting
 
@@ -49,7 +50,7 @@ def integrator_class(module: Any) -> type:
                         f"integrator '{PLUGIN}' supports {name} = {supported} only"
                     )
             self.mlrt_parameters = {
-                name: props.get(name) for name in TRACE_OPTIONS if name in props
+                name: props.get(name) for name in INTEGRATOR_OPTIONS if name in props
             }
             self.prepared: PreparedScene | None = None
 

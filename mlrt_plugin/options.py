@@ -31,6 +31,13 @@ BUILD_OPTIONS = (
 )
 """Fields of ``BuildOptions`` in ``cpp/kdtree/builder.h``."""
 
+INTEGRATOR_OPTIONS = (
+    *TRACE_OPTIONS,
+    *(name for name in BUILD_OPTIONS if name != "max_depth"),
+)
+"""Those that the integrator `mlrt` takes as parameters: by ``max_depth`` Mitsuba's
+integrators mean the length of paths."""
+
 AOVS = ("depth", "normal", "prim")
 """Images that can be had beside the colours."""
 

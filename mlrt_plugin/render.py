@@ -15,7 +15,7 @@ import numpy.typing as npt
 from ._dispatch import core
 from .emitters import check_distances
 from .errors import MlrtError, MlrtWarning
-from .options import AOVS, TRACE_OPTIONS, integer, split_options
+from .options import AOVS, BUILD_OPTIONS, TRACE_OPTIONS, integer, split_options
 from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
@@ -100,10 +100,7 @@ class PreparedScene:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
         samples = checked_spp(self.arrays.spp if spp is None else spp)
-        own = self.arrays.lighting
-        if own.integrator == "mlrt":
-            named = {k: v for k, v in own.parameters.items() if k in TRACE_OPTIONS}
-            trace = {**named, **trace}
+        trace = {**self.arrays.lighting.own_options(TRACE_OPTIONS), **trace}
         start = time.perf_counter()
         result = core.render(
             self.handle,
@@ -136,7 +133,8 @@ def prepare(
     tree_cache: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> PreparedScene:
-    """Reads a scene and builds its tree; `options` are of `BuildOptions`. See `render`.
+    """Reads a scene and builds its tree; `options` are of `BuildOptions`, and go before
+    those that the scene gives its integrator `mlrt`. See `render`.
 
     lighting: what to render in place of what the scene's integrator asks for.
     previous: a scene whose tree is taken over if the geometry is the same.
@@ -152,6 +150,7 @@ def prepare(
         arrays = import_scene(
             scene, sensor=sensor, defines=defines, resolution=resolution, lighting=lighting
         )
+    build = {**arrays.lighting.own_options(BUILD_OPTIONS), **build}
     loaded = time.perf_counter()
     tree = previous.tree_for(arrays, build) if previous is not None else None
     if tree is None:

@@ -7,6 +7,7 @@ and directions in world space.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -116,6 +117,12 @@ class Lighting:
     bsdf_samples: int = 1
     hide_emitters: bool = False
     parameters: dict[str, Any] = field(default_factory=dict)
+
+    def own_options(self, names: Collection[str]) -> dict[str, Any]:
+        """Those parameters of the integrator `mlrt` that are among `names`."""
+        if self.integrator != "mlrt":
+            return {}
+        return {k: value for k, value in self.parameters.items() if k in names}
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,10 @@ def run_tree(arguments: argparse.Namespace) -> None:
             obtained = obtain_tree(
                 arrays.vertices,
                 arrays.faces,
-                build_options_of(arguments),
+                {
+                    **arrays.lighting.own_options(BUILD_OPTIONS),
+                    **build_options_of(arguments),
+                },
                 arguments.tree_cache,
             )
         tree = obtained.tree

@@ -26,13 +26,14 @@ def tree_report(tree: Any) -> dict[str, Any]:
     references. empty_cell_splits, flat_cell_splits, area_floor_leaves: by the paper's
     rules 1, 2 and 3. expected_traversals, expected_leaf_visits and
     expected_primitive_visits of a line that crosses the root's cell, and sah_cost, its
-    expected cost in units of one traversal. node_bytes, reference_bytes, triangle_bytes
-    and their sum total_bytes. seconds that building took, once, and of its phases.
+    expected cost in units of one traversal. node_bytes, reference_bytes, triangle_bytes,
+    waiting_bytes that are kept to build the rest of a lazy tree, and their sum total_bytes.
+    seconds that building took, once, and of its phases.
 
-    Of a lazy tree the figures are those of the part that is built, and the rules' those of
-    what was split before the first ray. unbuilt_cells and unbuilt_references are what is
-    left to build; built_share is the least share of the triangles that is in none of these
-    cells, the least because a triangle may be in several.
+    Of a lazy tree the figures are those of the part that is built; of its seconds, those
+    before the first ray. unbuilt_cells and unbuilt_references are what is left to build;
+    built_share is the least share of the triangles that is in none of these cells, the
+    least because a triangle may be in several.
     """
     options = core.tree_options(tree)
     report: dict[str, Any] = {**tree.report, **core.tree_statistics(tree)}
@@ -55,7 +56,10 @@ def tree_report(tree: Any) -> dict[str, Any]:
     report["reference_bytes"] = len(core.tree_references(tree)) * REFERENCE_SIZE
     report["triangle_bytes"] = triangles * TRIANGLE_SIZE
     report["total_bytes"] = (
-        report["node_bytes"] + report["reference_bytes"] + report["triangle_bytes"]
+        report["node_bytes"]
+        + report["reference_bytes"]
+        + report["triangle_bytes"]
+        + report["waiting_bytes"]
     )
     return report
 
@@ -125,7 +129,8 @@ def report_lines(report: dict[str, Any]) -> list[str]:
     if report["unbuilt_cells"]:
         structure["Built so far"] = (
             f"{100 * report['built_share']:.1f} %; {report['unbuilt_references']} "
-            f"references in {report['unbuilt_cells']} cells are left"
+            f"references in {report['unbuilt_cells']} cells are left "
+            f"({size(report['waiting_bytes'])})"
         )
     quality = {
         "Empty cells by rule 1": report["empty_cell_splits"],

@@ -126,6 +126,8 @@ nb::dict statistics(const TreeHandle &self) {
     dict["max_leaf_count"] = found.max_leaf_count;
     dict["unbuilt_cells"] = found.unbuilt_cells;
     dict["unbuilt_references"] = found.unbuilt_references;
+    const LazyGrowth *growth = self.tree->growth.get();
+    dict["waiting_bytes"] = growth ? growth->state().waiting_bytes : 0;
     dict["depth"] = found.depth;
     dict["expected_traversals"] = found.expected_traversals;
     dict["expected_leaf_visits"] = found.expected_leaf_visits;

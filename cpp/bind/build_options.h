@@ -44,7 +44,7 @@ inline BuildOptions build_options_from(nanobind::handle dict) {
         refuse_value("empty_cell_share must be in (0, 1].");
     if (!(options.area_floor >= 0 && options.area_floor <= 1))
         refuse_value(
-            "area_floor must be in [0, 1]; 0 chooses it by the number of triangles.");
+            "area_floor must be in [0, 1]; 0 chooses it by the size of the triangles.");
     return options;
 }
 

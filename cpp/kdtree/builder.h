@@ -28,7 +28,7 @@ struct BuildOptions {
     bool rule_flat_cell = true;    // rule 2
     bool rule_area_floor = true;   // rule 3 (b)
     float empty_cell_share = 0.1f; // rule 1: least share of the cell's volume
-    float area_floor = 0.0f;       // rule 3: share of the scene's area; 0 chooses by count
+    float area_floor = 0.0f;       // rule 3: share of the scene's area; 0 chooses it
     int max_depth = 0; // of inner nodes on a path; 0 bounds the splits by count instead
 };
 

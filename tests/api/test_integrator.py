@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 import scene_files
 
-from mlrt_plugin import UnsupportedFeature, render
+from mlrt_plugin import UnsupportedFeature, prepare, render
+from mlrt_plugin.cli import main
 
 SceneFile = Callable[..., Path]
 
@@ -81,6 +83,46 @@ def test_options_reach_the_tracer(scene_file: SceneFile, scalar_variant: None) -
         render(path)
     with pytest.raises(ValueError, match="traversal"):
         mi.render(mi.load_file(str(path)))
+
+
+def parameter(tag: str, name: str, value: str) -> str:
+    return f'<integrator type="mlrt"><{tag} name="{name}" value="{value}"/></integrator>'
+
+
+@pytest.mark.parametrize("builder", ["exact", "fast", "lazy"])
+def test_options_reach_the_builder(
+    builder: str,
+    scene_file: SceneFile,
+    scalar_variant: None,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = scene_file("own.xml", integrator=parameter("string", "builder", builder))
+    expected = render(scene_file("plain.xml")).image
+    prepared = prepare(path)
+    assert prepared.report["builder"] == builder
+    np.testing.assert_array_equal(prepared.render().image, expected)
+    scene = mi.load_file(str(path))
+    np.testing.assert_array_equal(np.array(mi.render(scene)), expected)
+    assert scene.integrator().prepared.report["builder"] == builder
+    # What the caller asks for goes first.
+    assert prepare(path, builder="exact").report["builder"] == "exact"
+    for argv, chosen in ((["tree"], builder), (["tree", "--builder", "fast"], "fast")):
+        assert main([argv[0], str(path), *argv[1:], "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["builder"] == chosen
+
+
+def test_options_of_the_builder_are_checked(
+    scene_file: SceneFile, scalar_variant: None
+) -> None:
+    path = scene_file(integrator=parameter("float", "intersection_cost", "-1"))
+    with pytest.raises(ValueError, match="intersection_cost"):
+        mi.render(mi.load_file(str(path)))
+    # Of paths, as other integrators mean it, not of the tree.
+    path = scene_file(integrator=parameter("integer", "max_depth", "2"))
+    with pytest.raises(UnsupportedFeature, match="no parameter 'max_depth'"):
+        render(path)
+    with pytest.raises(RuntimeError, match="unreferenced"):
+        mi.load_file(str(path))
 
 
 def test_unsupported_scene(scene_file: SceneFile, scalar_variant: None) -> None:

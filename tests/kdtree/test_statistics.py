@@ -97,6 +97,8 @@ def test_a_lazy_tree_is_told_as_far_as_it_is_built() -> None:
     assert before["unbuilt_cells"] == before["nodes"] == 1
     assert before["unbuilt_references"] == 3000
     assert before["built_share"] == before["leaves"] == before["references"] == 0
+    assert before["waiting_bytes"] >= 28 * 3000
+    assert before["total_bytes"] == 8 + 36 * 3000 + before["waiting_bytes"]
     tree.closest_hit([[0.1, 0.2, -3]], [[0.0, 0.1, 1]])
     during = tree.report
     assert 0 < during["unbuilt_references"] < 3000
@@ -109,6 +111,7 @@ def test_a_lazy_tree_is_told_as_far_as_it_is_built() -> None:
     after, fast = tree.report, KdTree(*scene, builder="fast").report
     assert after["built_share"] == 1
     assert after["unbuilt_cells"] == after["unbuilt_references"] == 0
+    assert after["waiting_bytes"] == 0
     for name in ("nodes", "leaves", "references", "depth", "total_bytes", "leaf_histogram"):
         assert after[name] == fast[name]
 
