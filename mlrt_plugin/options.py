@@ -31,6 +31,9 @@ BUILD_OPTIONS = (
 )
 """Fields of ``BuildOptions`` in ``cpp/kdtree/builder.h``."""
 
+BUILDERS = ("auto", "exact", "fast", "lazy")
+"""Values of the option ``builder``."""
+
 INTEGRATOR_OPTIONS = (
     *TRACE_OPTIONS,
     *(name for name in BUILD_OPTIONS if name != "max_depth"),

@@ -11,12 +11,29 @@ from pathlib import Path
 from typing import Any
 
 from ._dispatch import core
-from .options import BUILD_OPTIONS
+from .options import BUILD_OPTIONS, BUILDERS
 from .peak_memory import PeakMemory
 from .scene_import import import_scene
 from .threads import thread_count
 from .tree_cache import obtain_tree
 from .tree_report import dropped_by_mesh, invisible_meshes, report_lines, tree_report
+
+HELP = {
+    "builder": "exact: the best tree; fast: nearly as good, on all threads; lazy: that of "
+    "fast, built where rays go; auto: exact below 65536 triangles, else fast",
+    "traversal_cost": "cost of a step through an inner node",
+    "intersection_cost": "cost of a test of a triangle",
+    "empty_bonus": "factor on the cost of splits that cut off empty space",
+    "clip": "clip triangles to cells",
+    "rule_empty_cell": "cut off large empty cells first (rule 1)",
+    "rule_flat_cell": "give triangles that cover a plane a flat cell (rule 2)",
+    "rule_area_floor": "leave small cells whole (rule 3)",
+    "empty_cell_share": "least share of a cell that rule 1 cuts off",
+    "area_floor": "share of the scene's surface area below which rule 3 leaves a cell "
+    "whole; 0 chooses it by the size of the triangles",
+    "max_depth": "inner nodes on a path; 0 limits them by the number of triangles",
+}
+"""What the options of the builder are."""
 
 
 def add_tree_cache(parser: argparse.ArgumentParser) -> None:
@@ -31,19 +48,22 @@ def add_tree_cache(parser: argparse.ArgumentParser) -> None:
 def add_build_options(
     parser: argparse.ArgumentParser, names: Sequence[str] = BUILD_OPTIONS
 ) -> None:
-    """A flag for each of some build options, of the type of its default."""
+    """A flag for each of some build options, by the type of its default."""
     group = parser.add_argument_group("options of the builder")
     for name, default in core.build_options().items():
         if name not in names:
             continue
-        kwargs: dict[str, Any] = {"help": f"default: {default}"}
+        kwargs: dict[str, Any]
         if isinstance(default, bool):
-            kwargs["action"] = argparse.BooleanOptionalAction
-            kwargs["help"] = f"default: {'on' if default else 'off'}"
-        elif not isinstance(default, str):
-            kwargs["type"] = type(default)
-            kwargs["metavar"] = "N"
-            kwargs["help"] = f"default: {default:g}"
+            kwargs = {"action": argparse.BooleanOptionalAction}
+            shown = "on" if default else "off"
+        elif isinstance(default, str):
+            kwargs = {"choices": BUILDERS}
+            shown = default
+        else:
+            kwargs = {"type": type(default), "metavar": "N"}
+            shown = f"{default:g}"
+        kwargs["help"] = f"{HELP[name]} (default: {shown})"
         group.add_argument(f"--{name.replace('_', '-')}", default=None, **kwargs)
 
 

@@ -129,7 +129,7 @@ def report_lines(report: dict[str, Any]) -> list[str]:
     if report["unbuilt_cells"]:
         structure["Built so far"] = (
             f"{100 * report['built_share']:.1f} %; {report['unbuilt_references']} "
-            f"references in {report['unbuilt_cells']} cells are left "
+            f"references are left in unbuilt cells, {report['unbuilt_cells']} of them "
             f"({size(report['waiting_bytes'])})"
         )
     quality = {

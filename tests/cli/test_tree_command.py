@@ -15,6 +15,7 @@ import scene_files
 from mlrt_plugin import prepare
 from mlrt_plugin._dispatch import core
 from mlrt_plugin.cli import main
+from mlrt_plugin.options import BUILDERS
 from mlrt_plugin.peak_memory import PeakMemory
 
 SceneFile = Callable[..., Path]
@@ -120,12 +121,19 @@ def test_each_option_has_a_flag(capsys: Output) -> None:
         assert f"--{name.replace('_', '-')}" in text
 
 
+def test_builders_are_those_of_the_core() -> None:
+    for name in BUILDERS:
+        assert core.build_options(builder=name)["builder"] == name
+    with pytest.raises(ValueError, match=f"one of: {', '.join(BUILDERS)}"):
+        core.build_options(builder="slow")
+
+
 @pytest.mark.parametrize(
     ("flags", "code", "expected"),
     [
         ("--max-depth 2.5", 2, "2.5"),
         ("--max-depth 65", 1, "max_depth"),
-        ("--builder slow", 1, "must be one of: auto, exact, fast, lazy"),
+        ("--builder slow", 2, "'slow'"),
         ("--empty-bonus 0", 1, "empty_bonus must be in"),
         ("-t 0", 1, "threads = 0"),
         ("-s 3", 1, "no sensor 3"),
