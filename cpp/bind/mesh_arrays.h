@@ -23,7 +23,7 @@ inline HugeArray<Triangle> triangles_of(const Points &vertices, const Faces &fac
         throw std::invalid_argument("a tree holds at most 2^31 - 1 faces");
     const nanobind::gil_scoped_release release;
     HugeArray<Triangle> triangles(face_count);
-    for_each_chunk(face_count, Threads::all, [&](uint32_t, uint64_t first, uint64_t last) {
+    for_each_chunk(face_count, all_threads(), [&](uint32_t, uint64_t first, uint64_t last) {
         for (uint64_t i = first; i < last; ++i) {
             Vec3f corner[3];
             for (int j = 0; j < 3; ++j) {

@@ -10,9 +10,9 @@ struct Around {
 
 // References that reach below and above the plane of a group.
 Around count_around(const PlanarGroup &group, const References &references,
-                    Threads threads) {
+                    const Crew &crew) {
     std::vector<Around> parts(chunk_count(references.count()));
-    for_each_chunk(references.count(), threads,
+    for_each_chunk(references.count(), crew,
                    [&](uint32_t chunk, uint64_t first, uint64_t last) {
                        Around part;
                        for (uint64_t i = first; i < last; ++i) {
@@ -34,17 +34,17 @@ Around count_around(const PlanarGroup &group, const References &references,
 
 std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
                                   std::span<const Triangle> triangles,
-                                  const BuildOptions &options, Threads threads) {
+                                  const BuildOptions &options, const Crew &crew) {
     const bool few = references.count() <= MAX_FEW_REFERENCES;
     std::optional<Bins> bins;
     if (!few)
-        bins.emplace(references, cell, threads);
+        bins.emplace(references, cell, crew);
     if (options.rule_flat_cell) {
         std::optional<Candidate> flat;
         for (const PlanarGroup &group :
              few ? planar_groups_of_few(references, cell) : bins->planar_groups())
             if (covers(group, cell, triangles)) {
-                const auto [below, above] = count_around(group, references, threads);
+                const auto [below, above] = count_around(group, references, crew);
                 const Candidate candidate = flat_cell(group, below, above, cell, options);
                 if (!flat || is_cheaper(candidate.cost, flat->cost))
                     flat = candidate;

@@ -13,7 +13,7 @@ namespace mlrt {
 // The planes of a cell by the fast method.
 std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
                                   std::span<const Triangle> triangles,
-                                  const BuildOptions &options, Threads threads);
+                                  const BuildOptions &options, const Crew &crew);
 
 // The fast method as far as `decide` needs it, for lists of any size.
 struct FastChoice {
@@ -21,14 +21,14 @@ struct FastChoice {
 
     std::span<const Triangle> triangles;
     const BuildOptions &options;
-    Threads threads;
+    const Crew &crew;
 
     std::optional<SplitPlane> largest_empty_part(const References &contents,
                                                  const Box3f &cell) const {
         return mlrt::largest_empty_part(contents.bounds, cell, options);
     }
     std::optional<Choice> choose(const References &contents, const Box3f &cell) const {
-        return choose_fast(contents, cell, triangles, options, threads);
+        return choose_fast(contents, cell, triangles, options, crew);
     }
 };
 
@@ -57,7 +57,7 @@ public:
         return mlrt::largest_empty_part(contents.bounds, cell, options_);
     }
     std::optional<Choice> choose(const Contents &contents, const Box3f &cell) const {
-        return choose_fast(contents, cell, triangles_, options_, Threads::one);
+        return choose_fast(contents, cell, triangles_, options_, one_thread());
     }
     Parts split(Contents contents, const Box3f &cell, const SplitPlane &plane, bool keep);
 

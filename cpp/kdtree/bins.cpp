@@ -101,8 +101,8 @@ BinGrid::BinGrid(const Box3f &cell, int count)
         }
 }
 
-Bins::Bins(const References &references, const Box3f &cell, Threads threads)
-    : references_(references), cell_(cell), threads_(threads),
+Bins::Bins(const References &references, const Box3f &cell, const Crew &crew)
+    : references_(references), cell_(cell), crew_(crew),
       bin_count_(references.count() >= MANY_REFERENCES ? MAX_BINS : FEW_BINS),
       grid_(cell, bin_count_) {
     const uint64_t count = references.count();
@@ -111,7 +111,7 @@ Bins::Bins(const References &references, const Box3f &cell, Threads threads)
         return;
     }
     std::vector<Counts> parts(chunk_count(count));
-    for_each_chunk(count, threads, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+    for_each_chunk(count, crew, [&](uint32_t chunk, uint64_t first, uint64_t last) {
         count_range(first, last, parts[chunk]);
     });
     for (const Counts &part : parts) {
@@ -209,7 +209,7 @@ std::vector<T> Bins::gather(Collect &&collect) const {
         return all;
     }
     std::vector<std::vector<T>> parts(chunk_count(count));
-    for_each_chunk(count, threads_, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+    for_each_chunk(count, crew_, [&](uint32_t chunk, uint64_t first, uint64_t last) {
         collect(first, last, parts[chunk]);
     });
     for (const std::vector<T> &part : parts)

@@ -46,7 +46,7 @@ HugeArray<Reference> make_references(const HugeArray<Triangle> &triangles, Box3f
     };
     std::vector<Part> parts(chunk_count(triangles.size()));
     HugeArray<Reference> references(triangles.size());
-    for_each_chunk(triangles.size(), Threads::all,
+    for_each_chunk(triangles.size(), all_threads(),
                    [&](uint32_t chunk, uint64_t first, uint64_t last) {
                        Part &part = parts[chunk];
                        for (uint64_t i = first; i < last; ++i) {

@@ -1,7 +1,7 @@
-// Loops over many references, by one thread or by all.
+// Loops over many references.
 #pragma once
 
-#include "base/parallel.h"
+#include "kdtree/crew.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -16,21 +16,18 @@ inline uint32_t chunk_count(uint64_t count) {
     return uint32_t((count + CHUNK - 1) / CHUNK);
 }
 
-enum class Threads { one, all };
-
 // Calls body(chunk, first, last) for each chunk of [0, count).
 template <typename Body>
-void for_each_chunk(uint64_t count, Threads threads, Body &&body) {
+void for_each_chunk(uint64_t count, const Crew &crew, Body &&body) {
     const auto run = [&](uint32_t chunk) {
         const uint64_t first = chunk * CHUNK;
         body(chunk, first, std::min(first + CHUNK, count));
     };
     const uint32_t chunks = chunk_count(count);
-    if (threads == Threads::all && chunks > 1)
-        parallel_for(chunks, run);
-    else
-        for (uint32_t chunk = 0; chunk < chunks; ++chunk)
-            run(chunk);
+    if (chunks > 1)
+        crew.run(chunks, run);
+    else if (chunks == 1)
+        run(0);
 }
 
 } // namespace mlrt

@@ -62,6 +62,8 @@ KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
         std::copy(contents.list.begin(), contents.list.end(), seed->own_list.get());
         seed->references.list = {seed->own_list.get(), count};
     }
+    if (count > MAX_COPIED_REFERENCES)
+        seed->crew = std::make_unique<WaitingCrew>();
     const uint32_t number = seed_count_.fetch_add(1);
     seeds_[number] = seed.release();
     unbuilt_cells_.fetch_add(1, std::memory_order_relaxed);
@@ -89,7 +91,10 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
         return node;
     Seed &seed = *seeds_[node.number()];
     if (seed.claimed.exchange(true)) {
-        seed.finished.wait(false);
+        if (seed.crew)
+            seed.crew->help();
+        else
+            seed.finished.wait(false);
         if (seed.error)
             std::rethrow_exception(seed.error);
         return load_node(nodes_[index]);
@@ -106,6 +111,8 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
     }
     seed.finished.store(true);
     seed.finished.notify_all();
+    if (seed.crew)
+        seed.crew->finish();
     if (seed.error)
         std::rethrow_exception(seed.error);
     return load_node(nodes_[index]);
@@ -114,7 +121,8 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
 KdNode LazyGrowth::grown(Seed &seed, bool whole) {
     KdNode node;
     BuildReport report;
-    FastChoice method{triangles_, options_, Threads::one};
+    const Crew &crew = seed.crew ? *seed.crew : one_thread();
+    FastChoice method{triangles_, options_, crew};
     Decision decision;
     whole = whole || seed.count() <= MAX_WHOLE_REFERENCES;
     if (!whole)
@@ -137,20 +145,24 @@ KdNode LazyGrowth::grown(Seed &seed, bool whole) {
             ++report.empty_leaves;
             ++report.empty_cell_splits;
         } else {
-            const bool large = seed.count() > MAX_COPIED_REFERENCES;
-            std::unique_ptr<Workspace> workspace;
-            std::shared_ptr<HugeArray<Reference>> list;
-            if (large)
-                list = std::make_shared<HugeArray<Reference>>(2 * seed.count());
-            else
-                workspace = workspaces_.take_for(seed.count());
-            const Halves halves = partitioner_.split(
-                seed.references, seed.cell, decision.plane,
-                large ? list->data() : workspace->method.room_for(seed.count()));
-            nodes_[children] = plant(lower_cell, decision.rest, halves.lower, list);
-            nodes_[children + 1] = plant(upper_cell, decision.rest, halves.upper, list);
-            if (workspace)
+            Halves halves;
+            if (seed.count() > MAX_COPIED_REFERENCES) {
+                const Partitioner::OwnHalves own = partitioner_.split_together(
+                    seed.references, seed.cell, decision.plane, crew, [](uint64_t count) {
+                        return std::make_shared<HugeArray<Reference>>(count);
+                    });
+                nodes_[children] = plant(lower_cell, decision.rest, own.lower, own.list);
+                nodes_[children + 1] =
+                    plant(upper_cell, decision.rest, own.upper, own.list);
+                halves = own;
+            } else {
+                std::unique_ptr<Workspace> workspace = workspaces_.take_for(seed.count());
+                halves = partitioner_.split(seed.references, seed.cell, decision.plane,
+                                            workspace->method.room_for(seed.count()));
+                nodes_[children] = plant(lower_cell, decision.rest, halves.lower);
+                nodes_[children + 1] = plant(upper_cell, decision.rest, halves.upper);
                 workspaces_.give_back(std::move(workspace));
+            }
             report.flat_cell_splits += decision.flat;
             for (const References &part : {halves.lower, halves.upper}) {
                 report.leaves += part.count() == 0;

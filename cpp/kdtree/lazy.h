@@ -2,8 +2,8 @@
 //
 // A node that is not built is a leaf with a mark (KdNode::unbuilt). Whoever enters it first
 // builds it and publishes the result by replacing the node in one store, behind which all
-// that it refers to is in place; others who come meanwhile wait for that node alone. What
-// is built is read without locks, as in any other tree.
+// that it refers to is in place; others who come meanwhile wait for that node alone, and
+// help if there is much to do. What is built is read without locks, as in any other tree.
 //
 // A cell is split by the same rules from the same references as by the fast builder: when
 // all is built, both trees are equal but for the order of their nodes.
@@ -68,6 +68,7 @@ private:
         // One of both holds the references.
         std::unique_ptr<Reference[]> own_list;
         SharedList shared_list;
+        std::unique_ptr<WaitingCrew> crew; // of large cells
         std::atomic<bool> claimed{false};
         std::atomic<bool> finished{false};
         std::exception_ptr error;

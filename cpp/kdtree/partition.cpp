@@ -60,10 +60,11 @@ Halves Partitioner::split(const References &references, const Box3f &cell,
             {{upper_room, writer.upper}, writer.upper_bounds}};
 }
 
-Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &references,
-                                                           const Box3f &cell,
-                                                           const SplitPlane &plane,
-                                                           const Allocate &allocate) const {
+Partitioner::OwnHalves Partitioner::split_together(const References &references,
+                                                   const Box3f &cell,
+                                                   const SplitPlane &plane,
+                                                   const Crew &crew,
+                                                   const Allocate &allocate) const {
     const auto [axis, position, planar_below] = plane;
     struct Part {
         uint64_t lower_count = 0, upper_count = 0;
@@ -74,7 +75,7 @@ Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &ref
     std::vector<Part> parts(chunk_count(count));
 
     // First count, so that each chunk knows where it writes.
-    for_each_chunk(count, Threads::all, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+    for_each_chunk(count, crew, [&](uint32_t chunk, uint64_t first, uint64_t last) {
         Part &part = parts[chunk];
         for (const Reference &reference : references.list.subspan(first, last - first)) {
             const bool below = reference.bounds.lo[axis] < position;
@@ -103,7 +104,7 @@ Partitioner::OwnHalves Partitioner::split_with_all_threads(const References &ref
     Reference *const lower = halves.list->data(), *const upper = lower + lower_count;
     halves.lower.list = {lower, lower_count};
     halves.upper.list = {upper, upper_count};
-    for_each_chunk(count, Threads::all, [&](uint32_t chunk, uint64_t first, uint64_t last) {
+    for_each_chunk(count, crew, [&](uint32_t chunk, uint64_t first, uint64_t last) {
         Part &part = parts[chunk];
         Writer writer{lower + starts[chunk].first, upper + starts[chunk].second, {}, {}};
         auto next_cut = part.cut.begin();

@@ -30,15 +30,15 @@ public:
     Halves split(const References &references, const Box3f &cell, const SplitPlane &plane,
                  Reference *room) const;
 
-    // The same with all threads, into an array that `allocate` gives for a number of
+    // The same with several threads, into an array that `allocate` gives for a number of
     // references.
     struct OwnHalves : Halves {
         std::shared_ptr<HugeArray<Reference>> list;
     };
     using Allocate = std::function<std::shared_ptr<HugeArray<Reference>>(uint64_t)>;
-    OwnHalves split_with_all_threads(const References &references, const Box3f &cell,
-                                     const SplitPlane &plane,
-                                     const Allocate &allocate) const;
+    OwnHalves split_together(const References &references, const Box3f &cell,
+                             const SplitPlane &plane, const Crew &crew,
+                             const Allocate &allocate) const;
 
 private:
     ClippedHalves cut(const Reference &reference, const Box3f &cell,

@@ -40,7 +40,7 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
               std::span<const Triangle> triangles, const Allowance &allowance,
               const BuildFrame &frame, uint64_t max_references,
               const Interruption &interruption) {
-    FastChoice method{triangles, frame.options, Threads::all};
+    FastChoice method{triangles, frame.options, all_threads()};
     const Partitioner partitioner(triangles, frame.options.clip);
     Top top;
     top.cells.push_back(bounds);
@@ -87,8 +87,8 @@ Top build_top(HugeArray<Reference> references, const Box3f &bounds,
             continue;
         }
         top.report.flat_cell_splits += decision.flat;
-        Partitioner::OwnHalves halves = partitioner.split_with_all_threads(
-            current.references, current.cell, decision.plane, allocate);
+        Partitioner::OwnHalves halves = partitioner.split_together(
+            current.references, current.cell, decision.plane, all_threads(), allocate);
         spare.give_back(std::move(current.list));
         // The lower one is taken first.
         pending.push_back({upper, upper_cell, decision.rest, halves.upper, halves.list});
