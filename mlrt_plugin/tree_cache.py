@@ -80,8 +80,13 @@ def obtain_tree(
 
 
 def make_folder(folder: Path) -> None:
+    """Makes a folder if it is not there; raises TreeFileError if that is not possible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise TreeFileError(
+            f"tree cache '{folder}' cannot be made: a file is in its place"
+        ) from error
     except OSError as error:
         raise TreeFileError(
             f"tree cache '{folder}' cannot be made: {error.strerror or error}"

@@ -36,10 +36,16 @@ HELP = {
 """What the options of the builder are."""
 
 
+def folder(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("the name of the folder is empty")
+    return Path(text)
+
+
 def add_tree_cache(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tree-cache",
-        type=Path,
+        type=folder,
         metavar="DIR",
         help="folder that trees are kept in for the next time",
     )

@@ -134,6 +134,7 @@ def test_builders_are_those_of_the_core() -> None:
         ("--max-depth 2.5", 2, "2.5"),
         ("--max-depth 65", 1, "max_depth"),
         ("--builder slow", 2, "'slow'"),
+        ("--tree-cache=", 2, "the name of the folder is empty"),
         ("--empty-bonus 0", 1, "empty_bonus must be in"),
         ("-t 0", 1, "threads = 0"),
         ("-s 3", 1, "no sensor 3"),
