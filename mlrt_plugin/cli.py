@@ -27,6 +27,10 @@ from .threads import thread_count
 from .tree_command import add_build_options, add_tree_cache, build_options_of, run_tree
 
 EXIT_ERROR, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
+NO_MEMORY = (
+    "there is not enough memory for the scene: close other programs, raise the limit that "
+    "'ulimit -v' shows, or take a smaller scene"
+)
 
 mitsuba: Any = mi
 """For what Mitsuba's type stubs leave out."""
@@ -165,9 +169,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     mitsuba.set_log_level(mi.LogLevel.Info if arguments.verbose else mi.LogLevel.Error)
     try:
         COMMANDS[arguments.command](arguments)
+        sys.stdout.flush()
     except KeyboardInterrupt:
         print("mlrt: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
+    except MemoryError:
+        if os.environ.get("MLRT_DEBUG"):
+            raise
+        print(f"mlrt: error: {NO_MEMORY}", file=sys.stderr)
+        return EXIT_ERROR
+    except BrokenPipeError:
+        # Whoever read the output has enough; nor may Python try once more when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_ERROR
     except Exception as error:
         if os.environ.get("MLRT_DEBUG"):
             raise

@@ -20,7 +20,8 @@ struct Allowance {
 Allowance whole_allowance(const BuildOptions &options, uint64_t count);
 
 // Rule 3 (b): share of the scene's surface area, `scene_area`, below which a cell stays
-// whole. `references` have the bounds of whole triangles.
+// whole, as the options give it or by the size of a typical triangle. `references` have the
+// bounds of whole triangles.
 double area_floor_of(const BuildOptions &options, std::span<const Reference> references,
                      double scene_area);
 

@@ -58,8 +58,8 @@ public:
     uint32_t first_reference() const { return payload_.first_reference; }
     uint32_t reference_count() const { return info_ >> 8; }
 
-    // Of a leaf.
     bool is_unbuilt() const { return (info_ & (UNBUILT | 3u)) == (UNBUILT | LEAF); }
+    // Of what is to be built in place of an unbuilt leaf.
     uint32_t number() const { return payload_.first_reference; }
 
 private:

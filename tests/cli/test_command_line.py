@@ -14,6 +14,7 @@ import repository
 import scene_files
 
 import mlrt_plugin
+from mlrt_plugin import cli
 from mlrt_plugin.cli import main
 
 SceneFile = Callable[..., Path]
@@ -165,6 +166,34 @@ def test_installed_command() -> None:
     assert run.stderr == (
         "mlrt: error: scene file 'absent.xml' does not exist: check its path\n"
     )
+
+
+def test_memory_that_does_not_suffice(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*arguments: object) -> None:
+        raise MemoryError
+
+    monkeypatch.setitem(cli.COMMANDS, "info", fail)
+    assert "not enough memory" in failure(["info", "any.xml"], 1, capsys)
+
+
+@pytest.mark.parametrize("argv", [["tree"], ["tree", "--json"], ["info"]])
+def test_a_reader_that_has_enough(argv: list[str], scene_file: SceneFile) -> None:
+    command = Path(sys.executable).with_name("mlrt")
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        run = subprocess.run(
+            [command, *argv, scene_file()],
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=60,
+        )
+    finally:
+        os.close(writing)
+    assert (run.returncode, run.stderr) == (1, "")
 
 
 def test_scene_text_is_a_scene(scene_file: SceneFile) -> None:
