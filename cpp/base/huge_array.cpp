@@ -1,9 +1,7 @@
 #include "base/huge_array.h"
 
-#include <cerrno>
 #include <new>
 #include <sys/mman.h>
-#include <unistd.h>
 
 namespace mlrt {
 
@@ -29,13 +27,6 @@ void *reserve_pages(uint64_t bytes) {
 
 void release_pages(void *pages, uint64_t bytes) {
     munmap(pages, bytes);
-}
-
-void trim_pages(void *pages, uint64_t offset, uint64_t bytes) {
-    const uint64_t page = uint64_t(sysconf(_SC_PAGESIZE));
-    const uint64_t first = (offset + page - 1) / page * page;
-    if (first < bytes)
-        madvise(static_cast<char *>(pages) + first, bytes - first, MADV_DONTNEED);
 }
 
 } // namespace mlrt

@@ -16,8 +16,6 @@ namespace mlrt {
 // std::bad_alloc.
 void *reserve_pages(uint64_t bytes);
 void release_pages(void *pages, uint64_t bytes);
-// Gives back what lies at and behind `offset`, which is rounded up to whole pages.
-void trim_pages(void *pages, uint64_t offset, uint64_t bytes);
 
 // The first size() of capacity() elements, which never move. Elements that nobody has
 // written are zero.
@@ -63,11 +61,6 @@ public:
     void set_size(uint64_t size) {
         MLRT_CHECK(size <= capacity_);
         size_ = size;
-    }
-    // Keeps the address and drops the room that is not used.
-    void trim() {
-        if (data_)
-            trim_pages(data_, size_ * sizeof(T), capacity_ * sizeof(T));
     }
     uint64_t bytes() const { return size_ * sizeof(T); }
 

@@ -57,8 +57,4 @@ bool parallel_for(uint32_t count, const std::function<void(uint32_t)> &body,
     return !job.stop.load(std::memory_order_relaxed);
 }
 
-uint32_t thread_count() {
-    return pool_size();
-}
-
 } // namespace mlrt

@@ -11,11 +11,9 @@ namespace mlrt {
 // numbers are kept in body, whatever mode the pool's threads are in.
 //
 // `cancelled`, if given, is asked now and then by the calling thread only; once it returns
-// true the calls that have not begun are left out and the function returns false.
+// true the calls that have not begun are left out and the function returns false. Throws
+// what a call threw, once all that have begun are done.
 bool parallel_for(uint32_t count, const std::function<void(uint32_t)> &body,
                   const std::function<bool()> &cancelled = {});
-
-// Threads that parallel_for uses, the caller included.
-uint32_t thread_count();
 
 } // namespace mlrt
