@@ -22,7 +22,7 @@ struct Mesh {
     // As the plugin makes them of its arrays.
     HugeArray<Triangle> triangles() const {
         HugeArray<Triangle> result(faces.size());
-        for_each_chunk(faces.size(), Threads::all,
+        for_each_chunk(faces.size(), all_threads(),
                        [&](uint32_t, uint64_t first, uint64_t last) {
                            for (uint64_t i = first; i < last; ++i)
                                result[i] = {vertices[faces[i][0]], vertices[faces[i][1]],
