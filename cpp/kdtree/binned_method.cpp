@@ -9,8 +9,7 @@ struct Around {
 };
 
 // References that reach below and above the plane of a group.
-Around count_around(const PlanarGroup &group, const References &references,
-                    const Crew &crew) {
+Around count_around(const PlanarGroup &group, const References &references, Crew &crew) {
     std::vector<Around> parts(chunk_count(references.count()));
     for_each_chunk(references.count(), crew,
                    [&](uint32_t chunk, uint64_t first, uint64_t last) {
@@ -34,7 +33,7 @@ Around count_around(const PlanarGroup &group, const References &references,
 
 std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
                                   std::span<const Triangle> triangles,
-                                  const BuildOptions &options, const Crew &crew) {
+                                  const BuildOptions &options, Crew &crew) {
     const bool few = references.count() <= MAX_FEW_REFERENCES;
     std::optional<Bins> bins;
     if (!few)

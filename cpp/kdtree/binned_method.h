@@ -13,7 +13,7 @@ namespace mlrt {
 // The planes of a cell by the fast method.
 std::optional<Choice> choose_fast(const References &references, const Box3f &cell,
                                   std::span<const Triangle> triangles,
-                                  const BuildOptions &options, const Crew &crew);
+                                  const BuildOptions &options, Crew &crew);
 
 // The fast method as far as `decide` needs it, for lists of any size.
 struct FastChoice {
@@ -21,7 +21,7 @@ struct FastChoice {
 
     std::span<const Triangle> triangles;
     const BuildOptions &options;
-    const Crew &crew;
+    Crew &crew;
 
     std::optional<SplitPlane> largest_empty_part(const References &contents,
                                                  const Box3f &cell) const {
@@ -68,7 +68,7 @@ public:
     }
 
     // Room for the parts of `count` references, while the stack is empty.
-    Reference *room_for(uint64_t count) {
+    Reference *room_for([[maybe_unused]] uint64_t count) {
         MLRT_CHECK(stack_.empty() && 2 * count <= stack_.capacity());
         return stack_.data();
     }

@@ -101,7 +101,7 @@ BinGrid::BinGrid(const Box3f &cell, int count)
         }
 }
 
-Bins::Bins(const References &references, const Box3f &cell, const Crew &crew)
+Bins::Bins(const References &references, const Box3f &cell, Crew &crew)
     : references_(references), cell_(cell), crew_(crew),
       bin_count_(references.count() >= MANY_REFERENCES ? MAX_BINS : FEW_BINS),
       grid_(cell, bin_count_) {

@@ -61,7 +61,7 @@ private:
 class Bins {
 public:
     // Counts `references`, which lie in `cell`.
-    Bins(const References &references, const Box3f &cell, const Crew &crew);
+    Bins(const References &references, const Box3f &cell, Crew &crew);
 
     // The cheapest plane found strictly inside the cell.
     std::optional<Candidate> best_plane(const BuildOptions &options) const;
@@ -90,7 +90,7 @@ private:
 
     const References &references_;
     const Box3f &cell_;
-    const Crew &crew_;
+    Crew &crew_;
     int bin_count_;
     BinGrid grid_;
     Counts counts_;

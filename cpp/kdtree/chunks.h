@@ -18,7 +18,7 @@ inline uint32_t chunk_count(uint64_t count) {
 
 // Calls body(chunk, first, last) for each chunk of [0, count).
 template <typename Body>
-void for_each_chunk(uint64_t count, const Crew &crew, Body &&body) {
+void for_each_chunk(uint64_t count, Crew &crew, Body &&body) {
     const auto run = [&](uint32_t chunk) {
         const uint64_t first = chunk * CHUNK;
         body(chunk, first, std::min(first + CHUNK, count));

@@ -10,7 +10,7 @@ namespace {
 
 class OneThread : public Crew {
 public:
-    void run(uint32_t count, const std::function<void(uint32_t)> &body) const override {
+    void run(uint32_t count, const std::function<void(uint32_t)> &body) override {
         for (uint32_t i = 0; i < count; ++i)
             body(i);
     }
@@ -18,24 +18,24 @@ public:
 
 class AllThreads : public Crew {
 public:
-    void run(uint32_t count, const std::function<void(uint32_t)> &body) const override {
+    void run(uint32_t count, const std::function<void(uint32_t)> &body) override {
         parallel_for(count, body);
     }
 };
 
 } // namespace
 
-const Crew &one_thread() {
-    static const OneThread crew;
+Crew &one_thread() {
+    static OneThread crew;
     return crew;
 }
 
-const Crew &all_threads() {
-    static const AllThreads crew;
+Crew &all_threads() {
+    static AllThreads crew;
     return crew;
 }
 
-void WaitingCrew::run(uint32_t count, const std::function<void(uint32_t)> &body) const {
+void WaitingCrew::run(uint32_t count, const std::function<void(uint32_t)> &body) {
     std::unique_lock lock(mutex_);
     body_ = &body;
     next_ = 0;
@@ -48,7 +48,7 @@ void WaitingCrew::run(uint32_t count, const std::function<void(uint32_t)> &body)
         std::rethrow_exception(std::exchange(error_, nullptr));
 }
 
-void WaitingCrew::help() const {
+void WaitingCrew::help() {
     std::unique_lock lock(mutex_);
     while (!finished_) {
         work(lock);
@@ -56,13 +56,13 @@ void WaitingCrew::help() const {
     }
 }
 
-void WaitingCrew::finish() const {
+void WaitingCrew::finish() {
     const std::lock_guard lock(mutex_);
     finished_ = true;
     changed_.notify_all();
 }
 
-void WaitingCrew::work(std::unique_lock<std::mutex> &lock) const {
+void WaitingCrew::work(std::unique_lock<std::mutex> &lock) {
     while (body_ && next_ < count_) {
         const uint32_t i = next_++;
         const auto &body = *body_;

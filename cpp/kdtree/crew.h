@@ -15,34 +15,34 @@ public:
     virtual ~Crew() = default;
 
     // Calls body(i) once for each i in [0, count), in any order.
-    virtual void run(uint32_t count, const std::function<void(uint32_t)> &body) const = 0;
+    virtual void run(uint32_t count, const std::function<void(uint32_t)> &body) = 0;
 };
 
 // The calling thread alone.
-const Crew &one_thread();
+Crew &one_thread();
 // The threads of the pool. Not for use from within its tasks: a thread that waits for
 // others takes up other tasks, which may need what it is about to finish.
-const Crew &all_threads();
+Crew &all_threads();
 
 // One thread that builds something, and those that cannot go on before it is there.
 class WaitingCrew : public Crew {
 public:
-    void run(uint32_t count, const std::function<void(uint32_t)> &body) const override;
+    void run(uint32_t count, const std::function<void(uint32_t)> &body) override;
 
     // Takes part in the loops of the thread that builds, until it calls finish().
-    void help() const;
-    void finish() const;
+    void help();
+    void finish();
 
 private:
     // Calls the body as long as there is something to do.
-    void work(std::unique_lock<std::mutex> &lock) const;
+    void work(std::unique_lock<std::mutex> &lock);
 
-    mutable std::mutex mutex_;
-    mutable std::condition_variable changed_;
-    mutable const std::function<void(uint32_t)> *body_ = nullptr;
-    mutable uint32_t next_ = 0, count_ = 0, running_ = 0;
-    mutable std::exception_ptr error_;
-    mutable bool finished_ = false;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    const std::function<void(uint32_t)> *body_ = nullptr;
+    uint32_t next_ = 0, count_ = 0, running_ = 0;
+    std::exception_ptr error_;
+    bool finished_ = false;
 };
 
 } // namespace mlrt

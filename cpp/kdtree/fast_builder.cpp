@@ -14,7 +14,7 @@ namespace {
 
 // Subtrees are dealt out when they have at most this many references: few enough to fit
 // the caches of a core, many enough to be worth a task. Not chosen by the number of
-// threads, of which the tree must not depend.
+// threads, on which the tree must not depend.
 constexpr uint64_t MAX_SUBTREE_REFERENCES = 32768;
 
 struct Subtree {

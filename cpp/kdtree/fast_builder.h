@@ -9,7 +9,7 @@
 namespace mlrt {
 
 // Fills nodes and references of `tree`, whose bounds and triangles are given, and adds to
-// `report`.
+// `report`. Throws Cancelled, and std::length_error for trees beyond what indices reach.
 void build_fast(KdTree &tree, BuildReport &report, HugeArray<Reference> references,
                 const BuildFrame &frame, const Interruption &interruption);
 

@@ -28,7 +28,7 @@ constexpr uint64_t MAX_COPIED_REFERENCES = 32768;
 
 // Room that is reserved for nodes, in proportion to that for references; memory is taken
 // when it is used.
-constexpr uint64_t NODES_PER_REFERENCE = 8;
+constexpr uint64_t NODES_PER_REFERENCE = 2;
 
 } // namespace
 
@@ -73,15 +73,19 @@ KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
 
 uint64_t LazyGrowth::take_nodes(uint64_t count) {
     const uint64_t first = node_count_.fetch_add(count);
-    if (first + count > max_nodes_)
+    if (first + count > max_nodes_) {
+        node_count_.fetch_sub(count);
         check_tree_size(KdNode::MAX_NODES + 1, 0);
+    }
     return first;
 }
 
 uint64_t LazyGrowth::take_references(uint64_t count) {
     const uint64_t first = reference_count_.fetch_add(count);
-    if (first + count > max_references_)
+    if (first + count > max_references_) {
+        reference_count_.fetch_sub(count);
         check_tree_size(0, uint64_t(1) << 32);
+    }
     return first;
 }
 
@@ -89,6 +93,7 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
     const KdNode node = load_node(nodes_[index]);
     if (!node.is_unbuilt())
         return node;
+    const KeepDenormals keep_denormals;
     Seed &seed = *seeds_[node.number()];
     if (seed.claimed.exchange(true)) {
         if (seed.crew)
@@ -100,7 +105,6 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
         return load_node(nodes_[index]);
     }
     try {
-        const KeepDenormals keep_denormals;
         publish_node(nodes_[index], grown(seed, whole));
         seed.own_list.reset();
         seed.shared_list.reset();
@@ -121,7 +125,7 @@ KdNode LazyGrowth::build(uint32_t index, bool whole) {
 KdNode LazyGrowth::grown(Seed &seed, bool whole) {
     KdNode node;
     BuildReport report;
-    const Crew &crew = seed.crew ? *seed.crew : one_thread();
+    Crew &crew = seed.crew ? *seed.crew : one_thread();
     FastChoice method{triangles_, options_, crew};
     Decision decision;
     whole = whole || seed.count() <= MAX_WHOLE_REFERENCES;

@@ -27,7 +27,7 @@ struct GrowthState {
     uint64_t references = 0;    // of finished leaves
     uint64_t unbuilt_cells = 0; // without the empty ones, of which nothing is to build
     uint64_t unbuilt_references = 0;
-    uint64_t waiting_bytes = 0; // kept for unbuilt cells
+    uint64_t waiting_bytes = 0; // of their references
 };
 
 class LazyGrowth {
@@ -48,7 +48,8 @@ public:
     uint64_t take_references(uint64_t count);
 
     // Builds the node one step further, or all below it, unless another thread does;
-    // returns it when it is not unbuilt any more.
+    // returns it when it is not unbuilt any more. Throws what building it threw, in every
+    // thread that asks.
     KdNode build(uint32_t index, bool whole);
 
     // Builds all that is not built, by all threads, whatever others ask for meanwhile.

@@ -62,8 +62,7 @@ Halves Partitioner::split(const References &references, const Box3f &cell,
 
 Partitioner::OwnHalves Partitioner::split_together(const References &references,
                                                    const Box3f &cell,
-                                                   const SplitPlane &plane,
-                                                   const Crew &crew,
+                                                   const SplitPlane &plane, Crew &crew,
                                                    const Allocate &allocate) const {
     const auto [axis, position, planar_below] = plane;
     struct Part {

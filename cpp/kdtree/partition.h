@@ -37,7 +37,7 @@ public:
     };
     using Allocate = std::function<std::shared_ptr<HugeArray<Reference>>(uint64_t)>;
     OwnHalves split_together(const References &references, const Box3f &cell,
-                             const SplitPlane &plane, const Crew &crew,
+                             const SplitPlane &plane, Crew &crew,
                              const Allocate &allocate) const;
 
 private:

@@ -28,7 +28,7 @@ struct Top {
     BuildReport report;                // of the inner nodes and finished leaves
 };
 
-// Splits cells of more than `max_references`.
+// Splits cells of more than `max_references`. Throws Cancelled.
 Top build_top(HugeArray<Reference> references, const Box3f &bounds,
               std::span<const Triangle> triangles, const Allowance &allowance,
               const BuildFrame &frame, uint64_t max_references,
