@@ -49,19 +49,26 @@ LazyGrowth::~LazyGrowth() {
 KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
                          const References &contents, SharedList list) {
     const uint64_t count = contents.count();
+    if (list || count == 0)
+        return plant(cell, allowance, contents, nullptr, std::move(list));
+    auto own_list = std::make_unique_for_overwrite<Reference[]>(count);
+    std::copy(contents.list.begin(), contents.list.end(), own_list.get());
+    const References copied{{own_list.get(), count}, contents.bounds};
+    return plant(cell, allowance, copied, std::move(own_list), nullptr);
+}
+
+KdNode LazyGrowth::plant(const Box3f &cell, const Allowance &allowance,
+                         const References &contents, OwnList own_list,
+                         SharedList shared_list) {
+    const uint64_t count = contents.count();
     if (count == 0)
         return KdNode::leaf(0, 0);
     auto seed = std::make_unique<Seed>();
     seed->cell = cell;
     seed->allowance = allowance;
     seed->references = contents;
-    if (list) {
-        seed->shared_list = std::move(list);
-    } else {
-        seed->own_list = std::make_unique_for_overwrite<Reference[]>(count);
-        std::copy(contents.list.begin(), contents.list.end(), seed->own_list.get());
-        seed->references.list = {seed->own_list.get(), count};
-    }
+    seed->own_list = std::move(own_list);
+    seed->shared_list = std::move(shared_list);
     if (count > MAX_COPIED_REFERENCES)
         seed->crew = std::make_unique<WaitingCrew>();
     const uint32_t number = seed_count_.fetch_add(1);
@@ -142,7 +149,8 @@ KdNode LazyGrowth::grown(Seed &seed, bool whole) {
         if (decision.kind == Decision::Kind::empty_cell) {
             const Box3f &full_cell = planar_below ? lower_cell : upper_cell;
             const KdNode full =
-                plant(full_cell, decision.rest, seed.references, seed.shared_list);
+                plant(full_cell, decision.rest, seed.references, std::move(seed.own_list),
+                      std::move(seed.shared_list));
             nodes_[children] = planar_below ? full : KdNode::leaf(0, 0);
             nodes_[children + 1] = planar_below ? KdNode::leaf(0, 0) : full;
             ++report.leaves;

@@ -61,13 +61,15 @@ public:
     GrowthState state() const;
 
 private:
+    using OwnList = std::unique_ptr<Reference[]>;
+
     // What is to be built in place of a node.
     struct Seed {
         Box3f cell;
         Allowance allowance;
         References references;
         // One of both holds the references.
-        std::unique_ptr<Reference[]> own_list;
+        OwnList own_list;
         SharedList shared_list;
         std::unique_ptr<WaitingCrew> crew; // of large cells
         std::atomic<bool> claimed{false};
@@ -77,6 +79,8 @@ private:
         uint64_t count() const { return references.count(); }
     };
 
+    KdNode plant(const Box3f &cell, const Allowance &allowance, const References &contents,
+                 OwnList own_list, SharedList shared_list);
     KdNode grown(Seed &seed, bool whole);
     KdNode whole_subtree(const Seed &seed, BuildReport &report);
     std::vector<uint32_t> unbuilt_nodes() const;
