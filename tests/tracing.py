@@ -24,7 +24,7 @@ BRUTE_FORCE: Options = {"traversal": "brute_force", "entry_points": False}
 
 TRAVERSALS: dict[str, Options] = {
     name: {"traversal": name, "entry_points": False}
-    for name in ("single", "packet", "interval")
+    for name in ("single", "packet", "interval", "beam_leaf")
 }
 """Traversals from the root."""
 
@@ -45,6 +45,8 @@ ENTRY_POINTS: dict[str, Options] = {
     "no culling": _entry_points(culling="none"),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
+    "beam_leaf": _entry_points(traversal="beam_leaf"),
+    "beam_leaf, large tiles": _entry_points(traversal="beam_leaf", minimum_tile=16),
 }
 """Traversals from entry points: MLRTA in its variants."""
 

@@ -12,6 +12,8 @@ struct Counters {
     uint64_t traversal_steps = 0; // nodes visited by packets, leaves included
     uint64_t leaf_visits = 0;     // of which leaves
     uint64_t triangle_tests = 0;  // packet against triangle
+    uint64_t beam_steps = 0;        // nodes visited by beams that go on to leaves
+    uint64_t beam_blocks = 0;       // up to eight triangles against a beam
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
     uint64_t exact_tests = 0;     // ... and that double precision left undecided
@@ -25,6 +27,8 @@ struct Counters {
         traversal_steps += other.traversal_steps;
         leaf_visits += other.leaf_visits;
         triangle_tests += other.triangle_tests;
+        beam_steps += other.beam_steps;
+        beam_blocks += other.beam_blocks;
         double_tests += other.double_tests;
         exact_tests += other.exact_tests;
         exact_distances += other.exact_distances;

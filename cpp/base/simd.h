@@ -25,6 +25,10 @@ using FloatPacket = drjit::Packet<float, PACKET_WIDTH>;
 using DoublePacket = drjit::Packet<double, PACKET_WIDTH>;
 using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 
+// Eight lanes, one register wherever packets take two: for a few triangles side by side.
+inline constexpr uint32_t BLOCK_WIDTH = 8;
+using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
+
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
 using PointIndices = drjit::Packet<int32_t, 4>;
@@ -53,6 +57,10 @@ template <typename T>
 T minimum(const T &a, const T &b) {
     if constexpr (std::is_arithmetic_v<T>) {
         return a < b ? a : b;
+#if defined(__AVX__)
+    } else if constexpr (std::is_same_v<T, FloatBlock>) {
+        return T(_mm256_min_ps(a.m, b.m));
+#endif
 #if defined(__AVX512F__)
     } else if constexpr (std::is_same_v<T, FloatPacket>) {
         return T(_mm512_min_ps(a.m, b.m));
@@ -71,6 +79,10 @@ template <typename T>
 T maximum(const T &a, const T &b) {
     if constexpr (std::is_arithmetic_v<T>) {
         return a > b ? a : b;
+#if defined(__AVX__)
+    } else if constexpr (std::is_same_v<T, FloatBlock>) {
+        return T(_mm256_max_ps(a.m, b.m));
+#endif
 #if defined(__AVX512F__)
     } else if constexpr (std::is_same_v<T, FloatPacket>) {
         return T(_mm512_max_ps(a.m, b.m));
@@ -115,6 +127,10 @@ inline float least_lane(const FloatPacket &a) {
 }
 inline float greatest_lane(const FloatPacket &a) {
     return drjit::max(a);
+}
+
+inline float sum_of_lanes(const FloatPacket &a) {
+    return drjit::sum(a);
 }
 
 inline bool any_lane(bool mask) {
@@ -202,6 +218,40 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
 #endif
     const LaneArray<Value> lanes = to_lanes<Value>(packet);
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
+}
+
+// Eight rows of eight values as columns: result[i] holds value i of each row.
+inline std::array<FloatBlock, BLOCK_WIDTH>
+load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
+#if defined(__AVX__)
+    const auto row = [&](int i) { return _mm256_loadu_ps(rows[i]); };
+    __m256 pair[8], quad[8];
+    for (int i = 0; i < 8; i += 2) {
+        pair[i] = _mm256_unpacklo_ps(row(i), row(i + 1));
+        pair[i + 1] = _mm256_unpackhi_ps(row(i), row(i + 1));
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int j = 0; j < 2; ++j) {
+            const __m256 a = pair[i + j], b = pair[i + 2 + j];
+            quad[i + 2 * j] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(1, 0, 1, 0));
+            quad[i + 2 * j + 1] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(3, 2, 3, 2));
+        }
+    std::array<FloatBlock, BLOCK_WIDTH> columns;
+    for (int i = 0; i < 4; ++i) {
+        columns[i] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x20));
+        columns[i + 4] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x31));
+    }
+    return columns;
+#else
+    std::array<FloatBlock, BLOCK_WIDTH> columns;
+    for (uint32_t i = 0; i < BLOCK_WIDTH; ++i) {
+        std::array<float, BLOCK_WIDTH> column;
+        for (uint32_t j = 0; j < BLOCK_WIDTH; ++j)
+            column[j] = rows[j][i];
+        columns[i] = drjit::load<FloatBlock>(column.data());
+    }
+    return columns;
+#endif
 }
 
 // The same vector in all lanes.

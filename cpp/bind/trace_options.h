@@ -16,7 +16,8 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                                  {{"brute_force", Traversal::brute_force},
                                                   {"single", Traversal::single},
                                                   {"packet", Traversal::packet},
-                                                  {"interval", Traversal::interval}},
+                                                  {"interval", Traversal::interval},
+                                                  {"beam_leaf", Traversal::beam_leaf}},
                                                  options.traversal);
     options.entry_points = fields.boolean("entry_points", options.entry_points);
     options.initial_tile = fields.integer_or("initial_tile", options.initial_tile, 1024);

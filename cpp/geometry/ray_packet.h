@@ -48,8 +48,6 @@ struct PacketCandidates {
     uint32_t exact_distances = 0; // lanes whose distance double precision could not round
 };
 
-inline constexpr float FLOAT_ROUNDOFF = 0x1p-24f;
-
 // The volumes U, V, W of triangle_test.h in single precision, and a bound on their error
 // that holds for all active lanes. They only filter: what they leave open is decided
 // exactly, so they may be evaluated in any way that keeps the bound.

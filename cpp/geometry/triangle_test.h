@@ -24,7 +24,8 @@
 
 namespace mlrt {
 
-// Unit roundoff of double.
+// Unit roundoff of float and of double.
+inline constexpr float FLOAT_ROUNDOFF = 0x1p-24f;
 inline constexpr double DOUBLE_ROUNDOFF = 0x1p-53;
 
 // How far the decision of a ray had to go.

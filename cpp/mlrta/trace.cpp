@@ -1,6 +1,7 @@
 #include "mlrta/trace.h"
 
 #include "mlrta/beam_judge.h"
+#include "mlrta/beam_leaf.h"
 #include "mlrta/tile.h"
 #include "traverse/brute_force.h"
 #include "traverse/interval.h"
@@ -40,6 +41,20 @@ struct ClosestOutput {
             hits.primitive[first + lane] = primitive[lane];
         });
     }
+    void set(uint32_t first, LaneBits lanes, const FloatPacket &t,
+             const UIntPacket &primitive) {
+        if (lanes == ALL_LANES) {
+            store(hits.t + first, t);
+            store(hits.primitive + first, primitive);
+            return;
+        }
+        const LaneArray<float> distances = to_lanes<float>(t);
+        const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitive);
+        for_each_lane(lanes, [&](uint32_t lane) {
+            hits.t[first + lane] = distances[lane];
+            hits.primitive[first + lane] = numbers[lane];
+        });
+    }
 };
 
 struct AnyOutput {
@@ -51,8 +66,10 @@ struct AnyOutput {
         occluded[ray] = hit.primitive != NO_PRIMITIVE;
     }
     void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
-        for_each_lane(lanes & state.hits.found,
-                      [&](uint32_t lane) { occluded[first + lane] = 1; });
+        set(first, lanes & state.hits.found);
+    }
+    void set(uint32_t first, LaneBits lanes) {
+        for_each_lane(lanes, [&](uint32_t lane) { occluded[first + lane] = 1; });
     }
 };
 
@@ -108,11 +125,50 @@ private:
     }
 
     void trace_packets(uint32_t first, uint32_t count, const Entry &entry) {
+        if constexpr (std::is_same_v<Origin, CommonOrigin>) {
+            if (options_.traversal == Traversal::beam_leaf) {
+                for (uint32_t i = 0; i < count; i += BeamPackets::MAX_RAYS)
+                    trace_beam(first + i, std::min(count - i, BeamPackets::MAX_RAYS), entry);
+                return;
+            }
+        }
+        trace_run(first, count, ALL_LANES, entry);
+    }
+
+    void trace_beam(uint32_t first, uint32_t count, const Entry &entry) {
+        BeamPackets &beam = beam_;
+        beam.load(rays_, first, count, tile_ ? &tile_->camera : nullptr);
+        counters_.packets += beam.count;
+        if (beam.any_active) {
+            trace_beam_leaf<Output::query>(tree_, rays_, entry, beam, counters_);
+            for (uint32_t n = 0; n < beam.count; ++n) {
+                const BeamPacket &packet = beam.packets[n];
+                counters_.rays += uint64_t(std::popcount(packet.active));
+                if (packet.found == 0)
+                    continue;
+                if constexpr (Output::query == Query::closest)
+                    output_.set(packet.first_ray, packet.found,
+                                hit_distances(tree_, rays_, packet, beam.origin, counters_),
+                                packet.primitive);
+                else
+                    output_.set(packet.first_ray, packet.found);
+            }
+        }
+        if (beam.any_stray)
+            for (uint32_t n = 0; n < beam.count; ++n)
+                if (const LaneBits strays = beam.packets[n].strays)
+                    trace_run(beam.packets[n].first_ray, std::min(PACKET_WIDTH, first + count - beam.packets[n].first_ray), strays, entry);
+    }
+
+    // Traces the given lanes of each packet.
+    void trace_run(uint32_t first, uint32_t count, LaneBits lanes, const Entry &entry) {
         for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
             auto [packet, extreme] = load_packet<Origin>(rays_, i);
             const LaneBits in_range = first + count - i >= PACKET_WIDTH
                                           ? ALL_LANES
                                           : (1u << (first + count - i)) - 1;
+            packet.active &= lanes;
+            extreme &= lanes;
             packet.active &= in_range;
             extreme &= in_range;
             if (options_.traversal == Traversal::single) {
@@ -144,6 +200,7 @@ private:
             break;
         case Traversal::packet:
         case Traversal::single:
+        case Traversal::beam_leaf:
             trace_packet(tree_, packet, entry, state, counters_);
             break;
         }
@@ -189,6 +246,7 @@ private:
     const CameraTile *tile_;
     Output output_;
     Counters &counters_;
+    BeamPackets beam_;
 };
 
 template <typename Output>

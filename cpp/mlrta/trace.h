@@ -18,6 +18,7 @@ enum class Traversal : uint32_t {
     packet,      // X2: 16 rays at a time, an interval each
     interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005,
                  // section 3.3)
+    beam_leaf,   // X4: beams of up to 256 rays, as far as rays share an origin; else X2
 };
 
 // Step 2 of inverse frustum culling, at leaves [C2].

@@ -1,0 +1,444 @@
+#include "mlrta/beam_leaf.h"
+
+#include "geometry/ray_packet.h"
+#include "mlrta/triangle_forms.h"
+#include "traverse/load_packet.h"
+#include "traverse/parameter_interval.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+Vec3f direction_of(const RayGroup &rays, uint32_t i) {
+    return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+}
+
+// Triangles that a beam has been tested against, as far as a small direct-mapped table
+// remembers them.
+class Mailbox {
+public:
+    Mailbox() { entries_.fill(NO_PRIMITIVE); }
+
+    // Whether it was there already; it is from now on.
+    bool put(uint32_t primitive) {
+        uint32_t &entry = entries_[primitive % SIZE];
+        const bool known = entry == primitive;
+        entry = primitive;
+        return known;
+    }
+
+private:
+    static constexpr uint32_t SIZE = 64;
+    std::array<uint32_t, SIZE> entries_;
+};
+
+// Depths at which the rays of a beam cross a plane across one axis, for a plane ahead at a
+// distance of one: at least `first`, at most `last`.
+struct CrossingDepths {
+    float first, last;
+};
+
+template <Query query>
+class BeamLeafTracer {
+public:
+    BeamLeafTracer(const KdTree &tree, const RayGroup &rays, BeamPackets &beam,
+                   Counters &counters)
+        : tree_(tree), rays_(rays), beam_(beam), counters_(counters) {
+        prepare_crossings();
+        prepare_sides();
+        update_least();
+    }
+
+    void trace(const Entry &entry);
+
+private:
+    struct Place {
+        uint32_t node;
+        float near, far; // depths at which the beam is in the cell
+        Box3f cell;
+    };
+
+    void prepare_crossings();
+    void prepare_sides();
+    bool clip(Place &place) const;
+    bool beside(const Box3f &cell) const;
+    void test_leaf(KdNode leaf);
+    void test_block(const uint32_t *numbers, uint32_t count);
+    void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
+    bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
+                     uint32_t primitive, bool covered);
+    void test_unsafe(BeamPacket &packet, uint32_t primitive);
+    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+                uint32_t primitive);
+    void update_least();
+
+    const KdTree &tree_;
+    const RayGroup &rays_;
+    BeamPackets &beam_;
+    Counters &counters_;
+    Mailbox mailbox_;
+    std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
+    Vec3<PointPacket> side_normals_; // of the four sides of the beam, outward
+    float side_slack_ = 0;
+    float least_ = 0;      // of all rays
+    float far_end_ = 0;    // no ray has anything to find beyond this depth
+};
+
+// A slope in [lo, hi] crosses a plane at distance q at a depth in [q / hi, q / lo], if it
+// leads there. The slopes have two roundings, and the products to come two more.
+template <Query query>
+void BeamLeafTracer<query>::prepare_crossings() {
+    const auto towards = [](float lo, float hi) -> CrossingDepths {
+        return {hi > 0 ? WIDEN_NEAR / hi : INFINITE, lo > 0 ? WIDEN_FAR / lo : INFINITE};
+    };
+    for (int n = 0; n < 3; ++n) {
+        const float lo = n == 2 ? beam_.side : beam_.slope_lo[n];
+        const float hi = n == 2 ? beam_.side : beam_.slope_hi[n];
+        crossing_[beam_.axes[n]] = {towards(lo, hi), towards(-hi, -lo)};
+    }
+}
+
+// The planes through the origin that bound the rectangle: outside where
+// +-(p - center) - half > 0, times the depth.
+template <Query query>
+void BeamLeafTracer<query>::prepare_sides() {
+    const SlopeRectangle &r = beam_.rectangle;
+    const auto [i, j, k] = beam_.axes;
+    const float c = r.cosine, s = r.sine;
+    const float at_p = r.center_u * c + r.center_v * s;
+    const float at_q = r.center_v * c - r.center_u * s;
+    const std::array<float, 4> normal_i{c, -c, -s, s}, normal_j{s, -s, c, -c};
+    const std::array<float, 4> normal_k{
+        beam_.side * (-at_p - r.half_p), beam_.side * (at_p - r.half_p),
+        beam_.side * (-at_q - r.half_q), beam_.side * (at_q - r.half_q)};
+    side_normals_[i] = load<PointPacket>(normal_i.data());
+    side_normals_[j] = load<PointPacket>(normal_j.data());
+    side_normals_[k] = load<PointPacket>(normal_k.data());
+    // Sixteen roundings of terms of at most this size are more than there are; and of
+    // denormal numbers a few units more.
+    const Box3f &bounds = tree_.bounds;
+    const float reach = std::max(max_component(abs(bounds.lo - beam_.origin)),
+                                 max_component(abs(bounds.hi - beam_.origin)));
+    side_slack_ = 16 * FLOAT_ROUNDOFF * reach * (2 + 2 * beam_.greatest_sum) + 0x1p-140f;
+}
+
+// Whether the cell lies wholly on the outer side of one of the beam's sides.
+template <Query query>
+bool BeamLeafTracer<query>::beside(const Box3f &cell) const {
+    PointPacket innermost(-side_slack_);
+    for (int axis = 0; axis < 3; ++axis) {
+        const PointPacket lo(cell.lo[axis] - beam_.origin[axis]);
+        const PointPacket hi(cell.hi[axis] - beam_.origin[axis]);
+        innermost = innermost + minimum(side_normals_[axis] * lo, side_normals_[axis] * hi);
+    }
+    return any_lane(innermost > 0.0f);
+}
+
+// Shortens the depths to those of the cell. Returns whether any are left.
+template <Query query>
+bool BeamLeafTracer<query>::clip(Place &place) const {
+    for (int axis = 0; axis < 3; ++axis) {
+        const float lo = place.cell.lo[axis] - beam_.origin[axis];
+        const float hi = place.cell.hi[axis] - beam_.origin[axis];
+        if (lo > 0) {
+            place.near = std::max(place.near, lo * crossing_[axis][0].first - TINY_PARAMETER);
+            place.far = std::min(place.far, hi * crossing_[axis][0].last + TINY_PARAMETER);
+        } else if (hi < 0) {
+            place.near = std::max(place.near, -hi * crossing_[axis][1].first - TINY_PARAMETER);
+            place.far = std::min(place.far, -lo * crossing_[axis][1].last + TINY_PARAMETER);
+        }
+    }
+    return place.near <= place.far && place.near < INFINITE;
+}
+
+template <Query query>
+void BeamLeafTracer<query>::trace(const Entry &entry) {
+    std::array<Place, MAX_TREE_DEPTH + 1> stack;
+    int pending = 0;
+    Place place{entry.node, 0, INFINITE, entry.cell};
+    if (!clip(place))
+        return;
+    for (;;) {
+        const KdNode node = tree_.node(place.node);
+        ++counters_.beam_steps;
+        if (!node.is_leaf()) {
+            const int axis = node.axis();
+            const float split = node.split();
+            const float distance = split - beam_.origin[axis];
+            const bool above = distance < 0;
+            const CrossingDepths unit = crossing_[axis][above];
+            const float size = std::abs(distance);
+            // Not a number if the origin lies in the plane: comparisons are written so
+            // that both sides are visited then.
+            const float first = size * unit.first - TINY_PARAMETER;
+            const float last = size * unit.last + TINY_PARAMETER;
+            const uint32_t near_child = node.lower_child() + above;
+            const uint32_t far_child = node.lower_child() + !above;
+            const bool enter_near = !(last < place.near);
+            const bool enter_far =
+                !(first > place.far) && !(first > far_end_);
+            if (enter_near && enter_far) {
+                Place &other = stack[pending++];
+                other = place;
+                other.node = far_child;
+                other.near = first > place.near ? first : place.near;
+                (above ? other.cell.hi : other.cell.lo)[axis] = split;
+            }
+            if (enter_near) {
+                place.node = near_child;
+                place.far = last < place.far ? last : place.far;
+                (above ? place.cell.lo : place.cell.hi)[axis] = split;
+                continue;
+            }
+            if (enter_far) {
+                place.node = far_child;
+                place.near = first > place.near ? first : place.near;
+                (above ? place.cell.hi : place.cell.lo)[axis] = split;
+                continue;
+            }
+        } else if (node.reference_count() > 0 && !beside(place.cell)) {
+            ++counters_.leaf_visits;
+            test_leaf(node);
+        }
+        do {
+            if (pending == 0 || least_ == INFINITE)
+                return;
+            place = stack[--pending];
+        } while (place.near > far_end_);
+    }
+}
+
+template <Query query>
+void BeamLeafTracer<query>::test_leaf(KdNode leaf) {
+    std::array<uint32_t, BLOCK_WIDTH> numbers;
+    uint32_t count = 0;
+    for (const uint32_t primitive : tree_.references_of(leaf)) {
+        if (mailbox_.put(primitive))
+            continue;
+        numbers[count++] = primitive;
+        if (count == BLOCK_WIDTH) {
+            test_block(numbers.data(), count);
+            count = 0;
+        }
+    }
+    if (count == 0)
+        return;
+    std::fill(numbers.begin() + count, numbers.end(), numbers[0]);
+    test_block(numbers.data(), count);
+}
+
+template <Query query>
+void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) {
+    TriangleForms forms;
+    forms.set(beam_, least_, tree_.triangles.data(), numbers, count);
+    ++counters_.beam_blocks;
+    for_each_lane(forms.possible, [&](uint32_t lane) {
+        test_triangle(forms, lane, numbers[lane]);
+    });
+    for_each_lane(forms.unsafe, [&](uint32_t lane) {
+        for (uint32_t n = 0; n < beam_.count; ++n)
+            test_unsafe(beam_.packets[n], numbers[lane]);
+    });
+}
+
+// Packets that the triangle may touch, sixteen at a time, then their rays.
+template <Query query>
+void BeamLeafTracer<query>::test_triangle(const TriangleForms &forms, uint32_t lane,
+                                          uint32_t primitive) {
+    const FloatPacket edge_error(forms.edge_error[lane]);
+    MaskOf<FloatPacket> touched, covered;
+    FloatPacket smallest, greatest;
+    for (int form = 0; form < 4; ++form) {
+        const FloatPacket of_p(forms.of_p[form][lane]), of_q(forms.of_q[form][lane]);
+        const FloatPacket middle =
+            fused(of_p, beam_.center_p,
+                  fused(of_q, beam_.center_q, FloatPacket(forms.center[form][lane])));
+        const FloatPacket extent =
+            fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
+        if (form == TriangleForms::DEPTH) {
+            greatest = middle + extent;
+        } else if (form == 0) {
+            smallest = middle - extent;
+            greatest = middle + extent;
+        } else {
+            smallest = minimum(smallest, middle - extent);
+            greatest = minimum(greatest, middle + extent);
+        }
+        if (form == 2) {
+            touched = greatest >= -edge_error;
+            covered = smallest > edge_error;
+        }
+    }
+    const FloatPacket highest =
+        fused(greatest, FloatPacket(forms.depth_grow[lane]), FloatPacket(forms.depth_error[lane]));
+    LaneBits packets = to_bits(touched & (highest >= load<FloatPacket>(beam_.least))) & ((1u << beam_.count) - 1);
+    const LaneBits covered_packets = to_bits(covered);
+    bool changed = false;
+    for_each_lane(packets, [&](uint32_t n) {
+        changed |= test_packet(beam_.packets[n], forms, lane, primitive,
+                               (covered_packets >> n & 1) != 0);
+    });
+    if (changed)
+        update_least();
+}
+
+// One triangle against sixteen rays. Returns whether they found something.
+template <Query query>
+bool BeamLeafTracer<query>::test_packet(BeamPacket &packet, const TriangleForms &forms,
+                                        uint32_t lane, uint32_t primitive, bool covered) {
+    ++counters_.triangle_tests;
+    const auto value = [&](int form) {
+        return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
+                     fused(packet.v, FloatPacket(forms.of_v[form][lane]),
+                           FloatPacket(forms.constant[form][lane])));
+    };
+    const FloatPacket depth = value(TriangleForms::DEPTH);
+    const FloatPacket error(forms.depth_error[lane]);
+    const FloatPacket highest = fused(depth, FloatPacket(forms.depth_grow[lane]), error);
+    LaneBits possible = to_bits(highest >= packet.least);
+    LaneBits certain = possible;
+    if (!covered) {
+        const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
+        const FloatPacket edge_error(forms.edge_error[lane]);
+        possible &= to_bits(smallest >= -edge_error);
+        if (possible == 0)
+            return false;
+        certain = possible & to_bits(smallest > edge_error);
+    } else if (possible == 0) {
+        return false;
+    }
+    const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
+    const LaneBits nearer = certain & to_bits((lowest > packet.greatest) &
+                                              (highest < packet.nearest));
+    if (nearer != 0) {
+        const auto mask = from_bits<FloatPacket>(nearer);
+        packet.found |= nearer;
+        if constexpr (query == Query::any) {
+            packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+        } else {
+            packet.least = select(mask, lowest, packet.least);
+            packet.greatest = select(mask, highest, packet.greatest);
+            packet.primitive =
+                select(from_bits<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
+        }
+    }
+    if ((possible & ~nearer) != 0)
+        decide(packet, possible & ~nearer, certain, primitive);
+    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
+    return true;
+}
+
+// By the contract of geometry/triangle_test.h, ray by ray.
+template <Query query>
+void BeamLeafTracer<query>::decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+                                   uint32_t primitive) {
+    const Triangle &triangle = tree_.triangles[primitive];
+    LaneArray<float> least = to_lanes<float>(packet.least);
+    LaneArray<float> greatest = to_lanes<float>(packet.greatest);
+    LaneArray<uint32_t> best = to_lanes<uint32_t>(packet.primitive);
+    for_each_lane(lanes, [&](uint32_t lane) {
+        const uint32_t ray = packet.first_ray + lane;
+        const Vec3f direction = direction_of(rays_, ray);
+        ++counters_.double_tests;
+        if ((certain_hits >> lane & 1) == 0) {
+            const HitDecision decision = decide_hit(beam_.origin, direction, triangle);
+            counters_.exact_tests += decision.precision == Precision::exact;
+            if (!decision.hit)
+                return;
+        }
+        const float t = hit_distance(beam_.origin, direction, triangle);
+        if (!(t > std::max(rays_.t_min[ray], 0.0f) && t < INFINITE))
+            return;
+        if ((packet.found >> lane & 1) == 0) {
+            if (!(t <= rays_.t_max[ray]))
+                return;
+        } else {
+            const float other =
+                hit_distance(beam_.origin, direction, tree_.triangles[best[lane]]);
+            if (!(t < other || (t == other && primitive < best[lane])))
+                return;
+        }
+        packet.found |= 1u << lane;
+        best[lane] = primitive;
+        // Of the distance, of the product, and of the reciprocal.
+        const double depth = double(t) * std::abs(direction[beam_.axes[2]]);
+        least[lane] = query == Query::any
+                          ? INFINITE
+                          : float(std::min((1 - 0x1p-21) / depth, 0x1p126));
+        greatest[lane] = float((1 + 0x1p-21) / depth);
+    });
+    packet.least = load<FloatPacket>(least);
+    packet.greatest = load<FloatPacket>(greatest);
+    packet.primitive = load<UIntPacket>(best);
+}
+
+// A triangle of which the forms say nothing, such as one whose plane holds the origin.
+template <Query query>
+void BeamLeafTracer<query>::test_unsafe(BeamPacket &packet, uint32_t primitive) {
+    const LaneBits searching = packet.active & to_bits(packet.least < INFINITE);
+    ++counters_.triangle_tests;
+    decide(packet, searching, 0, primitive);
+    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
+    update_least();
+}
+
+template <Query query>
+void BeamLeafTracer<query>::update_least() {
+    least_ = least_lane(load<FloatPacket>(beam_.least));
+    far_end_ = (1 + 4 * FLOAT_ROUNDOFF) / least_;
+}
+
+} // namespace
+
+template <Query query>
+void trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
+                     BeamPackets &beam, Counters &counters) {
+    BeamLeafTracer<query>(tree, rays, beam, counters).trace(entry);
+}
+
+FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
+                          const BeamPacket &packet, Vec3f origin, Counters &counters) {
+    const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(packet.primitive);
+    LaneArray<float> distances;
+    distances.fill(INFINITE);
+    LaneBits left = packet.found;
+    const uint32_t first = primitives[uint32_t(std::countr_zero(left))];
+    const LaneBits same = to_bits(packet.primitive == UIntPacket(first)) & left;
+    FloatPacket t(INFINITE);
+    if (std::popcount(same) > 3) {
+        const Triangle &triangle = tree.triangles[first];
+        const TrianglePlane plane(triangle);
+        Vec3<DoublePacket> direction;
+        for (int k = 0; k < 3; ++k)
+            direction[k] = to_double(
+                load_padded(rays.direction[k], packet.first_ray, rays.count));
+        const DoublePacket max_direction = maximum(
+            absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
+        const PlaneDistance<DoublePacket> distance(
+            plane, PlaneNumerator<double>(plane, Vec3d(triangle.a) - Vec3d(origin)), direction,
+            max_direction);
+        t = distance.template rounded<FloatPacket>();
+        left &= ~(same & to_bits(distance.template certain<FloatPacket>()));
+        if (left == 0)
+            return t;
+    }
+    distances = to_lanes<float>(t);
+    for_each_lane(left, [&](uint32_t lane) {
+        distances[lane] = hit_distance(origin, direction_of(rays, packet.first_ray + lane),
+                                       tree.triangles[primitives[lane]]);
+    });
+    (void) counters;
+    return load<FloatPacket>(distances);
+}
+
+template void trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
+                                              const Entry &, BeamPackets &, Counters &);
+template void trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &, const Entry &,
+                                          BeamPackets &, Counters &);
+
+} // namespace mlrt

@@ -1,0 +1,231 @@
+#include "mlrta/beam_packets.h"
+
+#include "traverse/load_packet.h"
+#include "traverse/parameter_interval.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+// A ray goes along with the beam if no other component of its direction exceeds that of the
+// main axis by more than this factor; chosen.
+constexpr float GREATEST_SLOPE = 2;
+
+// Directions whose main component lies outside lose digits or overflow on the way to
+// depths, and slopes that are smaller, but not zero, on the way to where planes are crossed.
+constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
+constexpr float SMALLEST_SLOPE = 0x1p-100f;
+
+// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those of
+// what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
+constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
+constexpr float SMALLEST_DEPTH = 0x1p-120f;
+
+FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
+    return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
+}
+
+} // namespace
+
+// The axis along which the ray in the middle of those that are active moves most.
+bool BeamPackets::choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count) {
+    for (uint32_t n = 0; n < ray_count; ++n) {
+        const uint32_t i = first + (n + ray_count / 2) % ray_count;
+        const Vec3f d{rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
+        const Vec3f size = abs(d);
+        if (!(std::max(rays.t_min[i], 0.0f) < rays.t_max[i]) || !is_finite(d) ||
+            !(max_component(size) > 0))
+            continue;
+        const int k = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        axes = {(k + 1) % 3, (k + 2) % 3, k};
+        side = d[k] > 0 ? 1.0f : -1.0f;
+        return true;
+    }
+    return false;
+}
+
+void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                              BeamPacket &packet) const {
+    const uint32_t first = packet.first_ray;
+    const auto [i, j, k] = axes;
+    const FloatPacket di = load_padded(rays.direction[i], first, last);
+    const FloatPacket dj = load_padded(rays.direction[j], first, last);
+    const FloatPacket dk = load_padded(rays.direction[k], first, last);
+    // In this order NaN stays NaN, and the ray inactive.
+    const FloatPacket t_min =
+        maximum(FloatPacket(0.0f), load_padded(rays.t_min, first, last));
+    const FloatPacket t_max = load_padded(rays.t_max, first, last);
+    const FloatPacket main = dk * side;
+    const FloatPacket reciprocal = 1.0f / main;
+    packet.u = di * reciprocal;
+    packet.v = dj * reciprocal;
+
+    const FloatPacket size_u = absolute(packet.u), size_v = absolute(packet.v);
+    const auto inside = (main >= SMALLEST_MAIN) & (main <= LARGEST_MAIN) &
+                        (maximum(size_u, size_v) <= GREATEST_SLOPE) &
+                        ((size_u >= SMALLEST_SLOPE) | (di == 0.0f)) &
+                        ((size_v >= SMALLEST_SLOPE) | (dj == 0.0f));
+    const LaneBits finite = to_bits((absolute(di) < INFINITE) & (absolute(dj) < INFINITE) &
+                                    (absolute(dk) < INFINITE) & (t_min < t_max));
+    packet.active = to_bits(inside) & finite;
+    packet.found = 0;
+    packet.primitive = UIntPacket(NO_PRIMITIVE);
+    packet.strays = 0;
+    if (packet.active != finite)
+        packet.strays = finite & ~packet.active &
+                        to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
+
+    const FloatPacket end = t_max * main;
+    const FloatPacket before_end =
+        maximum(end * (1 - WIDEN_DEPTH) - SMALLEST_DEPTH, FloatPacket(0.0f));
+    packet.least = masked(packet.active, 1.0f / (end * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH),
+                          INFINITE);
+    packet.greatest = 1.0f / before_end;
+    const FloatPacket begin = t_min * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
+    packet.nearest = (1 - WIDEN_DEPTH) / greatest_lane(masked(packet.active, begin, 0.0f));
+}
+
+// The image of the film's x axis in slopes, at the first packet.
+void BeamPackets::turn_as_film(const CameraMap &camera) {
+    const auto [i, j, k] = axes;
+    const float x = camera.dx[i] - to_lanes<float>(packets[0].u)[0] * side * camera.dx[k];
+    const float y = camera.dx[j] - to_lanes<float>(packets[0].v)[0] * side * camera.dx[k];
+    const float length = std::sqrt(x * x + y * y);
+    if (!(length > 0) || !std::isfinite(length))
+        return;
+    rectangle.cosine = x / length;
+    rectangle.sine = y / length;
+}
+
+// The direction in which slopes vary most: the greater main axis of their covariance.
+void BeamPackets::turn_as_rays() {
+    FloatPacket sum_u = 0.0f, sum_v = 0.0f, sum_uu = 0.0f, sum_uv = 0.0f, sum_vv = 0.0f;
+    uint32_t lanes = 0;
+    for (uint32_t n = 0; n < count; ++n) {
+        const BeamPacket &packet = packets[n];
+        const FloatPacket u =
+            masked(packet.active, packet.u - FloatPacket(rectangle.center_u), 0.0f);
+        const FloatPacket v =
+            masked(packet.active, packet.v - FloatPacket(rectangle.center_v), 0.0f);
+        sum_u = sum_u + u;
+        sum_v = sum_v + v;
+        sum_uu = fused(u, u, sum_uu);
+        sum_uv = fused(u, v, sum_uv);
+        sum_vv = fused(v, v, sum_vv);
+        lanes += uint32_t(__builtin_popcount(packet.active));
+    }
+    const float share = 1.0f / float(lanes);
+    const float mean_u = sum_of_lanes(sum_u) * share, mean_v = sum_of_lanes(sum_v) * share;
+    const float uu = sum_of_lanes(sum_uu) * share - mean_u * mean_u;
+    const float uv = sum_of_lanes(sum_uv) * share - mean_u * mean_v;
+    const float vv = sum_of_lanes(sum_vv) * share - mean_v * mean_v;
+    const float difference = uu - vv;
+    const float root = std::sqrt(difference * difference + 4 * uv * uv);
+    if (!(root > 0) || !std::isfinite(root))
+        return;
+    const float double_cosine = difference / root;
+    rectangle.cosine = std::sqrt(std::max(0.5f * (1 + double_cosine), 0.0f));
+    rectangle.sine =
+        std::copysign(std::sqrt(std::max(0.5f * (1 - double_cosine), 0.0f)), uv);
+}
+
+// Bounds of the slopes of each packet and of all, along the rectangle's sides.
+//
+// With r the greatest |p| or |q| relative to the first ray, the coordinates of a ray are
+// computed with an error of at most 6 roundings of 2 r, and cosine and sine have unit length
+// but for 4 roundings: 64 u r covers both, there and back. The center is rounded once more,
+// with an error of at most 4 u (|u| + |v|).
+void BeamPackets::fit_rectangle() {
+    const float c = rectangle.cosine, s = rectangle.sine;
+    const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
+    LaneArray<float> lo_p, hi_p, lo_q, hi_q;
+    lo_p.fill(INFINITE);
+    lo_q.fill(INFINITE);
+    hi_p.fill(-INFINITE);
+    hi_q.fill(-INFINITE);
+    least.fill(INFINITE);
+    FloatPacket lo_u = INFINITE, hi_u = -INFINITE, lo_v = INFINITE, hi_v = -INFINITE;
+    for (uint32_t n = 0; n < count; ++n) {
+        const BeamPacket &packet = packets[n];
+        if (packet.active == 0)
+            continue;
+        const auto active = from_bits<FloatPacket>(packet.active);
+        // Inactive lanes repeat the first ray of all.
+        const FloatPacket u = select(active, packet.u, first_u);
+        const FloatPacket v = select(active, packet.v, first_v);
+        lo_u = minimum(u, lo_u);
+        hi_u = maximum(u, hi_u);
+        lo_v = minimum(v, lo_v);
+        hi_v = maximum(v, hi_v);
+        const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
+        const FloatPacket p = fused(du, FloatPacket(c), dv * s);
+        const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
+        lo_p[n] = least_lane(select(active, p, FloatPacket(INFINITE)));
+        hi_p[n] = greatest_lane(select(active, p, FloatPacket(-INFINITE)));
+        lo_q[n] = least_lane(select(active, q, FloatPacket(INFINITE)));
+        hi_q[n] = greatest_lane(select(active, q, FloatPacket(-INFINITE)));
+        least[n] = least_lane(packet.least);
+    }
+    slope_lo[0] = least_lane(lo_u);
+    slope_hi[0] = greatest_lane(hi_u);
+    slope_lo[1] = least_lane(lo_v);
+    slope_hi[1] = greatest_lane(hi_v);
+    const float size_u = std::max(std::abs(slope_lo[0]), std::abs(slope_hi[0]));
+    const float size_v = std::max(std::abs(slope_lo[1]), std::abs(slope_hi[1]));
+
+    const FloatPacket p0 = mlrt::load<FloatPacket>(lo_p), p1 = mlrt::load<FloatPacket>(hi_p);
+    const FloatPacket q0 = mlrt::load<FloatPacket>(lo_q), q1 = mlrt::load<FloatPacket>(hi_q);
+    const float beam_p0 = least_lane(p0), beam_p1 = greatest_lane(p1);
+    const float beam_q0 = least_lane(q0), beam_q1 = greatest_lane(q1);
+    const float mid_p = 0.5f * (beam_p0 + beam_p1), mid_q = 0.5f * (beam_q0 + beam_q1);
+    rectangle.center_u += mid_p * c - mid_q * s;
+    rectangle.center_v += mid_p * s + mid_q * c;
+    const float reach = std::max({-beam_p0, beam_p1, -beam_q0, beam_q1});
+    const float slack =
+        FLOAT_ROUNDOFF * (64 * reach + 8 * (std::abs(rectangle.center_u) +
+                                            std::abs(rectangle.center_v) + size_u + size_v));
+    rectangle.half_p = 0.5f * (beam_p1 - beam_p0) + slack;
+    rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
+    greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
+                   2 * (rectangle.half_p + rectangle.half_q);
+    // Packets without rays have NaN here, and an infinite `least`.
+    center_p = 0.5f * (p0 + p1) - mid_p;
+    center_q = 0.5f * (q0 + q1) - mid_q;
+    half_p = 0.5f * (p1 - p0) + slack;
+    half_q = 0.5f * (q1 - q0) + slack;
+}
+
+void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
+                       const CameraMap *camera) {
+    origin = rays.common_origin;
+    count = 0;
+    any_active = any_stray = false;
+    if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
+        return;
+    const BeamPacket *first_active = nullptr;
+    for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
+        BeamPacket &packet = packets[count++];
+        packet.first_ray = i;
+        load_packet(rays, first + ray_count, packet);
+        if (packet.active != 0 && !first_active)
+            first_active = &packet;
+        any_stray |= packet.strays != 0;
+    }
+    if (!first_active)
+        return;
+    any_active = true;
+    const uint32_t lane = uint32_t(__builtin_ctz(first_active->active));
+    rectangle = {};
+    rectangle.center_u = to_lanes<float>(first_active->u)[lane];
+    rectangle.center_v = to_lanes<float>(first_active->v)[lane];
+    if (camera)
+        turn_as_film(*camera);
+    else
+        turn_as_rays();
+    fit_rectangle();
+}
+
+} // namespace mlrt

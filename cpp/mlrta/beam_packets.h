@@ -1,0 +1,81 @@
+// The rays of a beam with a common origin, projected along the beam's main axis: what the
+// beam-leaf traversal tests triangles against.
+//
+// With k the main axis and i, j the two that follow it cyclically, the direction of a ray is
+// |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i / |d_k| and
+// v = d_j / |d_k|; side is the sign that all d_k share. What is linear in the direction is
+// |d_k| times something linear in (u, v), and so is one over the depth z = t |d_k| at which
+// a plane is met.
+#pragma once
+
+#include "base/simd.h"
+#include "mlrta/beam.h"
+#include "traverse/ray_group.h"
+
+#include <array>
+#include <cstdint>
+
+namespace mlrt {
+
+// A rectangle of slopes, turned by an angle: the points center + p (cosine, sine) +
+// q (-sine, cosine) with |p| <= half_p and |q| <= half_q.
+struct SlopeRectangle {
+    float center_u = 0, center_v = 0;
+    float cosine = 1, sine = 0;
+    float half_p = 0, half_q = 0;
+};
+
+// Sixteen rays of a beam and the best that they have found.
+//
+// Depths are compared by their reciprocals. The end of a ray's interval counts as what it
+// has found at first. A triangle may be nearer if its reciprocal depth may exceed `least`,
+// and is for certain if it certainly exceeds `greatest`. A ray that searches no more, or is
+// not active, has infinite `least`.
+struct BeamPacket {
+    FloatPacket u, v;
+    FloatPacket least, greatest; // bounds of 1 / z of the best hit
+    UIntPacket primitive;        // of the best hit
+    float nearest;               // reciprocal depths below it lie behind every t_min
+    uint32_t first_ray;          // of the group
+    LaneBits active, found;
+
+    // Rays that do not go along with the beam, or whose direction is so long or short that
+    // slopes or depths could lose it. They are not active here.
+    LaneBits strays;
+};
+
+struct BeamPackets {
+    static constexpr uint32_t CAPACITY = PACKET_WIDTH;
+    static constexpr uint32_t MAX_RAYS = CAPACITY * PACKET_WIDTH;
+
+    Vec3f origin;
+    std::array<int, 3> axes; // i, j, k
+    float side;
+    uint32_t count; // of packets
+    std::array<BeamPacket, CAPACITY> packets;
+    bool any_active, any_stray;
+
+    SlopeRectangle rectangle; // holds the slopes of all active rays
+    float slope_lo[2], slope_hi[2];
+    float greatest_sum; // of 1 + |u| + |v| in the rectangle
+
+    // Of each packet, a rectangle parallel to that of the beam and relative to its center,
+    // and the smallest `least` of its rays, infinite if none is active.
+    FloatPacket center_p, center_q, half_p, half_q;
+    LaneArray<float> least;
+
+    // Projects up to MAX_RAYS rays from `first` on, which start at the group's common
+    // origin. `camera` made them, if it is given: the rectangle is then turned as the film
+    // is, else as the rays spread.
+    void load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
+              const CameraMap *camera);
+
+private:
+    bool choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count);
+    void load_packet(const RayGroup &rays, uint32_t last, BeamPacket &packet) const;
+    void turn_as_film(const CameraMap &camera);
+    void turn_as_rays();
+    void fit_rectangle();
+};
+
+} // namespace mlrt

@@ -1,0 +1,129 @@
+#include "mlrta/triangle_forms.h"
+
+#include "geometry/triangle_test.h"
+
+namespace mlrt {
+
+namespace {
+
+// What exceeds these might overflow on the way to a form, what falls below might lose
+// digits to underflow.
+constexpr float LARGEST_SIZE = 0x1p40f, SMALLEST_VOLUME = 0x1p-100f;
+
+// What underflow may take from a component of a normal, and from a volume by unit of size.
+constexpr float UNDERFLOW = 0x1p-146f;
+
+// Bounds on errors, in units of roundoff.
+//
+// Let s be the largest component of a vertex relative to the origin, e that of an edge, and
+// S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge once, so that
+// each product of a normal's component has three roundings and their difference a fourth: 4
+// of at most 2 s e. Dividing by the volume rounds twice more. Slopes have two roundings, and
+// evaluating a form two: 10 in a row, of at most 2 s e S each. Over a rectangle two roundings
+// lead to the form's value at the center, three to its change along a side, and five to the
+// sum of all: 16 in a row. That is 32 s e S; 40 covers products of roundings and the bound.
+constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
+// The same for a normal N, which is made of two edges: with e in the place of s.
+constexpr float PLANE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
+// The volume a.N has three terms of at most 2 s e^2 with the roundings of N, of a, of a
+// product and two sums: 8 in a row, 48 s e^2.
+constexpr float VOLUME_ROUNDINGS = 52 * FLOAT_ROUNDOFF;
+// What is certain of the volume: that no more than this share of it is error.
+constexpr float LARGEST_SHARE = 0.25f;
+
+FloatBlock largest_component(const Vec3<FloatBlock> &v) {
+    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
+}
+
+} // namespace
+
+void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
+                        const uint32_t *numbers, uint32_t count) {
+    std::array<const float *, BLOCK_WIDTH> rows;
+    std::array<float, BLOCK_WIDTH> last;
+    for (uint32_t n = 0; n < BLOCK_WIDTH; ++n) {
+        const Triangle &triangle = triangles[numbers[n]];
+        rows[n] = &triangle.a.x;
+        last[n] = triangle.c.z;
+    }
+    const std::array<FloatBlock, BLOCK_WIDTH> eight = load_columns(rows);
+    const FloatBlock ninth = load<FloatBlock>(last.data());
+    const FloatBlock *const columns[9] = {&eight[0], &eight[1], &eight[2],
+                                          &eight[3], &eight[4], &eight[5],
+                                          &eight[6], &eight[7], &ninth};
+    // In the order (i, j, k), which is cyclic and keeps the sign of products.
+    const auto [i, j, k] = beam.axes;
+    const auto vertex = [&](int n) -> Vec3<FloatBlock> {
+        return {*columns[3 * n + i], *columns[3 * n + j], *columns[3 * n + k]};
+    };
+    const Vec3<FloatBlock> o{FloatBlock(beam.origin[i]), FloatBlock(beam.origin[j]),
+                             FloatBlock(beam.origin[k])};
+    const Vec3<FloatBlock> va = vertex(0), vb = vertex(1), vc = vertex(2);
+    const Vec3<FloatBlock> a = va - o, b = vb - o, c = vc - o;
+    const Vec3<FloatBlock> ab = vb - va, bc = vc - vb, ca = va - vc;
+    const Vec3<FloatBlock> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab),
+                                         cross(ca, ab)};
+    const FloatBlock volume = dot(a, normals[DEPTH]);
+
+    const FloatBlock size =
+        maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
+    const FloatBlock edge = maximum(largest_component(ab),
+                                    maximum(largest_component(bc), largest_component(ca)));
+    const FloatBlock volume_error =
+        (VOLUME_ROUNDINGS * size) * (edge * edge) + UNDERFLOW * (size + 1.0f);
+    const FloatBlock inverse = 1.0f / volume;
+    const FloatBlock inverse_size = absolute(inverse);
+    const FloatBlock share = volume_error * inverse_size;
+    const auto safe = (size < LARGEST_SIZE) & (absolute(volume) > SMALLEST_VOLUME) &
+                      (share <= LARGEST_SHARE);
+    const LaneBits given = (1u << count) - 1;
+    const LaneBits safe_bits = to_bits(safe) & given;
+    unsafe = given & ~safe_bits;
+    possible = 0;
+    if (safe_bits == 0)
+        return;
+
+    const FloatBlock sum(beam.greatest_sum);
+    const FloatBlock edge_bound =
+        (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
+    const FloatBlock depth_bound =
+        (PLANE_ROUNDINGS * (edge * edge) + UNDERFLOW) * sum * inverse_size;
+    store(edge_error, edge_bound);
+
+    const SlopeRectangle &rectangle = beam.rectangle;
+    const FloatBlock center_u(rectangle.center_u), center_v(rectangle.center_v);
+    const FloatBlock cosine(rectangle.cosine), sine(rectangle.sine);
+    const FloatBlock half_p(rectangle.half_p), half_q(rectangle.half_q);
+    MaskOf<FloatBlock> inside = safe;
+    FloatBlock greatest;
+    for (int form = 0; form < 4; ++form) {
+        const FloatBlock form_u = normals[form].x * inverse;
+        const FloatBlock form_v = normals[form].y * inverse;
+        const FloatBlock form_1 = normals[form].z * (inverse * beam.side);
+        const FloatBlock middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
+        const FloatBlock form_p = fused(form_u, cosine, form_v * sine);
+        const FloatBlock form_q = fused(form_v, cosine, -(form_u * sine));
+        greatest =
+            middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
+        if (form != DEPTH)
+            inside &= greatest >= -edge_bound;
+        store(constant[form], form_1);
+        store(of_u[form], form_u);
+        store(of_v[form], form_v);
+        store(center[form], middle);
+        store(of_p[form], form_p);
+        store(of_q[form], form_q);
+    }
+    // With the exact value y and the computed one x = y (1 + r) + f, |r| <= share <= 1/4 and
+    // |f| <= depth_bound: y is at most (x + f) (1 + 2 share) and at least
+    // (x - f) (1 - share), for x of either sign as far as y is positive.
+    const FloatBlock grow = 1.0f + 2.0f * share, shrink = 1.0f - 2.0f * share;
+    const FloatBlock error = 2.0f * depth_bound;
+    store(depth_grow, grow * (1 + 4 * FLOAT_ROUNDOFF));
+    store(depth_shrink, shrink * (1 - 4 * FLOAT_ROUNDOFF));
+    store(depth_error, error);
+    inside &= fused(greatest, grow * (1 + 4 * FLOAT_ROUNDOFF), error) >= least;
+    possible = to_bits(inside) & safe_bits;
+}
+
+} // namespace mlrt

@@ -1,0 +1,47 @@
+// Eight triangles as a beam sees them: linear forms in the slopes of its rays.
+//
+// Of a triangle (a, b, c) relative to the common origin and a ray of direction
+// d = |d_k| (u, v, side), the volumes U, V, W of geometry/triangle_test.h are
+// |d_k| (n_k side + n_i u + n_j v) with the edge normals n = b x c, c x a, a x b, and the
+// reciprocal of the depth z = t |d_k| is (N_k side + N_i u + N_j v) / a.N with
+// N = (b - a) x (c - a). Divided by a.N, whose sign is theirs wherever t > 0, all three
+// volumes are >= 0 if and only if the ray hits.
+//
+// The forms are evaluated in single precision with bounds on their error: they say what is
+// certain. The rest is decided exactly.
+#pragma once
+
+#include "geometry/triangle.h"
+#include "mlrta/beam_packets.h"
+
+#include <cstdint>
+
+namespace mlrt {
+
+struct alignas(64) TriangleForms {
+    static constexpr uint32_t CAPACITY = BLOCK_WIDTH;
+    static constexpr int DEPTH = 3; // after the three edges
+    using Lanes = float[CAPACITY];
+
+    // value = constant + u * of_u + v * of_v
+    Lanes constant[4], of_u[4], of_v[4];
+
+    // The same over the beam's rectangle: value = center + p * of_p + q * of_q.
+    Lanes center[4], of_p[4], of_q[4];
+
+    // A computed edge form is within edge_error of the exact one, anywhere in the beam. With
+    // x a computed reciprocal depth, the exact one, if positive, is at least
+    // x * depth_shrink - depth_error and at most x * depth_grow + depth_error.
+    Lanes edge_error, depth_error, depth_shrink, depth_grow;
+
+    // Triangles that rays of the beam may hit nearer than all of them already have, and
+    // those of which the forms say nothing.
+    LaneBits possible = 0, unsafe = 0;
+
+    // Takes in up to eight triangles; `numbers` has eight entries, of which those behind
+    // the first `count` name any triangle.
+    void set(const BeamPackets &beam, float least, const Triangle *triangles,
+             const uint32_t *numbers, uint32_t count);
+};
+
+} // namespace mlrt
