@@ -14,10 +14,12 @@ struct Counters {
     uint64_t triangle_tests = 0;  // packet against triangle
     uint64_t beam_steps = 0;        // nodes visited by beams that go on to leaves
     uint64_t beam_blocks = 0;       // up to eight triangles against a beam
+    uint64_t beam_triangles = 0;    // triangles that a beam may hit
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
     uint64_t exact_tests = 0;     // ... and that double precision left undecided
     uint64_t tiles = 0;           // tiles for which an entry point was searched
+    uint64_t fallbacks = 0;    // beams that were given up and split
     uint64_t missed_tiles = 0;    // tiles that no leaf can hold a hit for
 
     Counters &operator+=(const Counters &other) {
@@ -29,10 +31,12 @@ struct Counters {
         triangle_tests += other.triangle_tests;
         beam_steps += other.beam_steps;
         beam_blocks += other.beam_blocks;
+        beam_triangles += other.beam_triangles;
         double_tests += other.double_tests;
         exact_tests += other.exact_tests;
         exact_distances += other.exact_distances;
         tiles += other.tiles;
+        fallbacks += other.fallbacks;
         missed_tiles += other.missed_tiles;
         return *this;
     }

@@ -28,6 +28,7 @@ using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 // Eight lanes, one register wherever packets take two: for a few triangles side by side.
 inline constexpr uint32_t BLOCK_WIDTH = 8;
 using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
+using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -264,6 +265,12 @@ inline double to_double(float a) {
 }
 inline DoublePacket to_double(const FloatPacket &a) {
     return DoublePacket(a);
+}
+inline DoubleBlock to_double(const FloatBlock &a) {
+    return DoubleBlock(a);
+}
+inline Vec3<DoubleBlock> to_double(const Vec3<FloatBlock> &v) {
+    return {DoubleBlock(v.x), DoubleBlock(v.y), DoubleBlock(v.z)};
 }
 inline Vec3d to_double(Vec3f v) {
     return Vec3d(v);

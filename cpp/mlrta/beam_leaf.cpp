@@ -46,27 +46,35 @@ struct CrossingDepths {
 template <Query query>
 class BeamLeafTracer {
 public:
-    BeamLeafTracer(const KdTree &tree, const RayGroup &rays, BeamPackets &beam,
-                   Counters &counters)
-        : tree_(tree), rays_(rays), beam_(beam), counters_(counters) {
+    BeamLeafTracer(const KdTree &tree, const RayGroup &rays, uint32_t most_triangles,
+                   BeamPackets &beam, Counters &counters)
+        : tree_(tree), rays_(rays), beam_(beam), counters_(counters),
+          triangles_left_(most_triangles) {
         prepare_crossings();
         prepare_sides();
         update_least();
     }
 
-    void trace(const Entry &entry);
+    bool trace(const Entry &entry);
 
 private:
-    struct Place {
+    struct Depths {
+        float near, far; // at which the beam is in a cell
+    };
+
+    // A child that waits for the nearer one.
+    struct Pending {
         uint32_t node;
-        float near, far; // depths at which the beam is in the cell
-        Box3f cell;
+        Depths depths;
+        uint32_t changes; // of the cell, up to its parent
+        uint32_t bound;   // that its plane moves, and where to
+        float split;
     };
 
     void prepare_crossings();
     void prepare_sides();
-    bool clip(Place &place) const;
-    bool beside(const Box3f &cell) const;
+    bool clip(Depths &depths) const;
+    bool beside() const;
     void test_leaf(KdNode leaf);
     void test_block(const uint32_t *numbers, uint32_t count);
     void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
@@ -81,8 +89,10 @@ private:
     const RayGroup &rays_;
     BeamPackets &beam_;
     Counters &counters_;
+    uint32_t triangles_left_;
     Mailbox mailbox_;
     std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
+    std::array<float, 6> cell_; // lower and upper bounds relative to the origin
     Vec3<PointPacket> side_normals_; // of the four sides of the beam, outward
     float side_slack_ = 0;
     float least_ = 0;      // of all rays
@@ -129,87 +139,109 @@ void BeamLeafTracer<query>::prepare_sides() {
 
 // Whether the cell lies wholly on the outer side of one of the beam's sides.
 template <Query query>
-bool BeamLeafTracer<query>::beside(const Box3f &cell) const {
+bool BeamLeafTracer<query>::beside() const {
     PointPacket innermost(-side_slack_);
-    for (int axis = 0; axis < 3; ++axis) {
-        const PointPacket lo(cell.lo[axis] - beam_.origin[axis]);
-        const PointPacket hi(cell.hi[axis] - beam_.origin[axis]);
-        innermost = innermost + minimum(side_normals_[axis] * lo, side_normals_[axis] * hi);
-    }
+    for (int axis = 0; axis < 3; ++axis)
+        innermost =
+            innermost + minimum(side_normals_[axis] * PointPacket(cell_[axis]),
+                                side_normals_[axis] * PointPacket(cell_[3 + axis]));
     return any_lane(innermost > 0.0f);
 }
 
 // Shortens the depths to those of the cell. Returns whether any are left.
 template <Query query>
-bool BeamLeafTracer<query>::clip(Place &place) const {
+bool BeamLeafTracer<query>::clip(Depths &depths) const {
     for (int axis = 0; axis < 3; ++axis) {
-        const float lo = place.cell.lo[axis] - beam_.origin[axis];
-        const float hi = place.cell.hi[axis] - beam_.origin[axis];
+        const float lo = cell_[axis], hi = cell_[3 + axis];
+        const auto &crossing = crossing_[axis];
         if (lo > 0) {
-            place.near = std::max(place.near, lo * crossing_[axis][0].first - TINY_PARAMETER);
-            place.far = std::min(place.far, hi * crossing_[axis][0].last + TINY_PARAMETER);
+            depths.near = std::max(depths.near, lo * crossing[0].first - TINY_PARAMETER);
+            depths.far = std::min(depths.far, hi * crossing[0].last + TINY_PARAMETER);
         } else if (hi < 0) {
-            place.near = std::max(place.near, -hi * crossing_[axis][1].first - TINY_PARAMETER);
-            place.far = std::min(place.far, -lo * crossing_[axis][1].last + TINY_PARAMETER);
+            depths.near = std::max(depths.near, -hi * crossing[1].first - TINY_PARAMETER);
+            depths.far = std::min(depths.far, -lo * crossing[1].last + TINY_PARAMETER);
         }
     }
-    return place.near <= place.far && place.near < INFINITE;
+    return depths.near <= depths.far && depths.near < INFINITE;
 }
 
 template <Query query>
-void BeamLeafTracer<query>::trace(const Entry &entry) {
-    std::array<Place, MAX_TREE_DEPTH + 1> stack;
-    int pending = 0;
-    Place place{entry.node, 0, INFINITE, entry.cell};
-    if (!clip(place))
-        return;
+bool BeamLeafTracer<query>::trace(const Entry &entry) {
+    struct Change {
+        uint32_t bound;
+        float before;
+    };
+    std::array<Pending, MAX_TREE_DEPTH + 1> stack;
+    std::array<Change, MAX_TREE_DEPTH + 1> changes;
+    uint32_t pending = 0, changed = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        cell_[axis] = entry.cell.lo[axis] - beam_.origin[axis];
+        cell_[3 + axis] = entry.cell.hi[axis] - beam_.origin[axis];
+    }
+    // Cells are kept as one box and a list of what to undo.
+    const auto change = [&](uint32_t bound, float value) {
+        changes[changed++] = {bound, cell_[bound]};
+        cell_[bound] = value;
+    };
+    uint32_t node_index = entry.node;
+    Depths depths{0, INFINITE};
+    if (!clip(depths))
+        return true;
     for (;;) {
-        const KdNode node = tree_.node(place.node);
+        const KdNode node = tree_.node(node_index);
         ++counters_.beam_steps;
         if (!node.is_leaf()) {
-            const int axis = node.axis();
-            const float split = node.split();
-            const float distance = split - beam_.origin[axis];
-            const bool above = distance < 0;
+            const uint32_t axis = uint32_t(node.axis());
+            const float distance = node.split() - beam_.origin[int(axis)];
+            const uint32_t above = distance < 0;
             const CrossingDepths unit = crossing_[axis][above];
             const float size = std::abs(distance);
             // Not a number if the origin lies in the plane: comparisons are written so
             // that both sides are visited then.
             const float first = size * unit.first - TINY_PARAMETER;
             const float last = size * unit.last + TINY_PARAMETER;
-            const uint32_t near_child = node.lower_child() + above;
-            const uint32_t far_child = node.lower_child() + !above;
-            const bool enter_near = !(last < place.near);
-            const bool enter_far =
-                !(first > place.far) && !(first > far_end_);
-            if (enter_near && enter_far) {
-                Place &other = stack[pending++];
-                other = place;
-                other.node = far_child;
-                other.near = first > place.near ? first : place.near;
-                (above ? other.cell.hi : other.cell.lo)[axis] = split;
-            }
+            const bool enter_near = !(last < depths.near);
+            const bool enter_far = !(first > depths.far) && !(first > far_end_);
+            const uint32_t far_child = node.lower_child() + 1 - above;
+            const uint32_t far_bound = above ? axis + 3 : axis;
+            const float far_near = first > depths.near ? first : depths.near;
             if (enter_near) {
-                place.node = near_child;
-                place.far = last < place.far ? last : place.far;
-                (above ? place.cell.lo : place.cell.hi)[axis] = split;
+                if (enter_far)
+                    stack[pending++] = {far_child,
+                                        {far_near, depths.far},
+                                        changed,
+                                        far_bound,
+                                        distance};
+                node_index = node.lower_child() + above;
+                depths.far = last < depths.far ? last : depths.far;
+                change(above ? axis : axis + 3, distance);
                 continue;
             }
             if (enter_far) {
-                place.node = far_child;
-                place.near = first > place.near ? first : place.near;
-                (above ? place.cell.hi : place.cell.lo)[axis] = split;
+                node_index = far_child;
+                depths.near = far_near;
+                change(far_bound, distance);
                 continue;
             }
-        } else if (node.reference_count() > 0 && !beside(place.cell)) {
+        } else if (node.reference_count() > 0 && !beside()) {
             ++counters_.leaf_visits;
             test_leaf(node);
+            if (triangles_left_ == 0)
+                return false;
         }
         do {
             if (pending == 0 || least_ == INFINITE)
-                return;
-            place = stack[--pending];
-        } while (place.near > far_end_);
+                return true;
+            --pending;
+        } while (stack[pending].depths.near > far_end_);
+        const Pending &next = stack[pending];
+        while (changed > next.changes) {
+            --changed;
+            cell_[changes[changed].bound] = changes[changed].before;
+        }
+        change(next.bound, next.split);
+        node_index = next.node;
+        depths = next.depths;
     }
 }
 
@@ -237,6 +269,9 @@ void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) 
     TriangleForms forms;
     forms.set(beam_, least_, tree_.triangles.data(), numbers, count);
     ++counters_.beam_blocks;
+    const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
+    counters_.beam_triangles += tested;
+    triangles_left_ -= std::min(triangles_left_, tested);
     for_each_lane(forms.possible, [&](uint32_t lane) {
         test_triangle(forms, lane, numbers[lane]);
     });
@@ -250,6 +285,13 @@ void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) 
 template <Query query>
 void BeamLeafTracer<query>::test_triangle(const TriangleForms &forms, uint32_t lane,
                                           uint32_t primitive) {
+    const auto beside = (absolute(beam_.center_p - forms.box_p[lane]) >
+                         beam_.half_p + forms.box_half_p[lane]) |
+                        (absolute(beam_.center_q - forms.box_q[lane]) >
+                         beam_.half_q + forms.box_half_q[lane]);
+    LaneBits packets = ((1u << beam_.count) - 1) & ~to_bits(beside);
+    if (packets == 0)
+        return;
     const FloatPacket edge_error(forms.edge_error[lane]);
     MaskOf<FloatPacket> touched, covered;
     FloatPacket smallest, greatest;
@@ -276,7 +318,7 @@ void BeamLeafTracer<query>::test_triangle(const TriangleForms &forms, uint32_t l
     }
     const FloatPacket highest =
         fused(greatest, FloatPacket(forms.depth_grow[lane]), FloatPacket(forms.depth_error[lane]));
-    LaneBits packets = to_bits(touched & (highest >= load<FloatPacket>(beam_.least))) & ((1u << beam_.count) - 1);
+    packets &= to_bits(touched & (highest >= load<FloatPacket>(beam_.least)));
     const LaneBits covered_packets = to_bits(covered);
     bool changed = false;
     for_each_lane(packets, [&](uint32_t n) {
@@ -396,9 +438,9 @@ void BeamLeafTracer<query>::update_least() {
 } // namespace
 
 template <Query query>
-void trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
-                     BeamPackets &beam, Counters &counters) {
-    BeamLeafTracer<query>(tree, rays, beam, counters).trace(entry);
+bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
+                     uint32_t most_triangles, BeamPackets &beam, Counters &counters) {
+    return BeamLeafTracer<query>(tree, rays, most_triangles, beam, counters).trace(entry);
 }
 
 FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
@@ -436,9 +478,10 @@ FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
     return load<FloatPacket>(distances);
 }
 
-template void trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
-                                              const Entry &, BeamPackets &, Counters &);
-template void trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &, const Entry &,
-                                          BeamPackets &, Counters &);
+template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
+                                              const Entry &, uint32_t, BeamPackets &,
+                                              Counters &);
+template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &, const Entry &,
+                                          uint32_t, BeamPackets &, Counters &);
 
 } // namespace mlrt

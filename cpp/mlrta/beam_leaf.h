@@ -14,9 +14,12 @@ namespace mlrt {
 
 // Finds for the active rays of a beam what they hit in the subtree: nearest hits by number
 // of triangle, or any. The group is the one that the beam was loaded from.
+//
+// Gives up once it has tested more than `most_triangles` against the beam, and returns
+// false: what has been found till then is true of Query::any, and of no use otherwise.
 template <Query query>
-void trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
-                     BeamPackets &beam, Counters &counters);
+bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
+                     uint32_t most_triangles, BeamPackets &beam, Counters &counters);
 
 // Distances of the nearest hits that were found, as a packet of the group has them; other
 // lanes hold any value.

@@ -2,6 +2,7 @@
 
 #include "mlrta/beam_judge.h"
 #include "mlrta/beam_leaf.h"
+#include "mlrta/regroup.h"
 #include "mlrta/tile.h"
 #include "traverse/brute_force.h"
 #include "traverse/interval.h"
@@ -22,6 +23,20 @@ namespace {
 struct ClosestOutput {
     static constexpr Query query = Query::closest;
     HitGroup hits;
+
+    // Room for the answers of regrouped rays, and where they belong.
+    struct Buffer {
+        std::array<float, BeamPackets::MAX_RAYS> t;
+        std::array<uint32_t, BeamPackets::MAX_RAYS> primitive;
+
+        ClosestOutput output() { return {{t.data(), primitive.data()}}; }
+    };
+    void scatter(const Buffer &buffer, const RegroupedRays &rays) const {
+        for (uint32_t i = 0; i < rays.count; ++i) {
+            hits.t[rays.number[i]] = buffer.t[i];
+            hits.primitive[rays.number[i]] = buffer.primitive[i];
+        }
+    }
 
     void clear(uint32_t count) {
         std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
@@ -61,6 +76,16 @@ struct AnyOutput {
     static constexpr Query query = Query::any;
     uint8_t *occluded;
 
+    struct Buffer {
+        std::array<uint8_t, BeamPackets::MAX_RAYS> occluded;
+
+        AnyOutput output() { return {occluded.data()}; }
+    };
+    void scatter(const Buffer &buffer, const RegroupedRays &rays) const {
+        for (uint32_t i = 0; i < rays.count; ++i)
+            occluded[rays.number[i]] = buffer.occluded[i];
+    }
+
     void clear(uint32_t count) { std::fill_n(occluded, count, uint8_t(0)); }
     void set(uint32_t ray, const Hit &hit) {
         occluded[ray] = hit.primitive != NO_PRIMITIVE;
@@ -91,6 +116,12 @@ public:
         const uint32_t initial = options_.initial_tile * options_.initial_tile;
         for (uint32_t first = 0; first < rays_.count; first += initial)
             trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_));
+    }
+
+    // Traces all rays of the group from an entry point.
+    void trace_from(const Entry &entry) {
+        output_.clear(rays_.count);
+        trace_beam(0, rays_.count, entry);
     }
 
 private:
@@ -138,9 +169,30 @@ private:
     void trace_beam(uint32_t first, uint32_t count, const Entry &entry) {
         BeamPackets &beam = beam_;
         beam.load(rays_, first, count, tile_ ? &tile_->camera : nullptr);
+        if (beam.any_active && split_beam(first, count, entry, false))
+            return;
         counters_.packets += beam.count;
+        counters_.tiles += 1;
         if (beam.any_active) {
-            trace_beam_leaf<Output::query>(tree_, rays_, entry, beam, counters_);
+            static const uint32_t B0 = getenv("B0") ? atoi(getenv("B0")) : 1000000;
+            static const uint32_t B1 = getenv("B1") ? atoi(getenv("B1")) : 1000000;
+            static const uint32_t BN = getenv("BN") ? atoi(getenv("BN")) : 64;
+            const uint32_t most = count > BN ? Output::query == Query::any ? B1 : B0 : ~0u;
+            const uint64_t before = counters_.beam_triangles;
+            const bool complete = trace_beam_leaf<Output::query>(tree_, rays_, entry, most, beam, counters_);
+            *cost_ += 0.5f * (float(counters_.beam_triangles - before) / float(count) - *cost_);
+            if (!complete) {
+                ++counters_.fallbacks;
+                if constexpr (Output::query == Query::any)
+                    for (uint32_t n = 0; n < beam.count; ++n) {
+                        BeamPacket &packet = beam.packets[n];
+                        if (packet.found)
+                            output_.set(packet.first_ray, packet.found);
+                        packet.active &= ~packet.found;
+                    }
+                split_beam(first, count, entry, true);
+                return;
+            }
             for (uint32_t n = 0; n < beam.count; ++n) {
                 const BeamPacket &packet = beam.packets[n];
                 counters_.rays += uint64_t(std::popcount(packet.active));
@@ -158,6 +210,49 @@ private:
             for (uint32_t n = 0; n < beam.count; ++n)
                 if (const LaneBits strays = beam.packets[n].strays)
                     trace_run(beam.packets[n].first_ray, std::min(PACKET_WIDTH, first + count - beam.packets[n].first_ray), strays, entry);
+    }
+
+    // Traces the parts of a beam whose rays leave a gap, or of which some go another way,
+    // as beams of their own. Returns false if there is nothing to split.
+    bool split_beam(uint32_t first, uint32_t count, const Entry &entry, bool force) {
+        RegroupedRays parts[2];
+        parts[0].count = parts[1].count = 0;
+        if (beam_.any_stray) {
+            for (uint32_t n = 0; n < beam_.count; ++n) {
+                const BeamPacket &packet = beam_.packets[n];
+                for_each_lane(packet.active | packet.strays, [&](uint32_t lane) {
+                    const uint32_t ray = packet.first_ray + lane;
+                    parts[packet.strays >> lane & 1].add(rays_, ray, ray);
+                });
+            }
+        } else {
+            if (!force && (tile_ || count <= PACKET_WIDTH))
+                return false;
+            static const float SH0 = getenv("SHARE") ? atof(getenv("SHARE")) : 0.6f;
+            static const float SH1 = getenv("SHARE1") ? atof(getenv("SHARE1")) : 0.9f;
+            static const float COST = getenv("COST") ? atof(getenv("COST")) : 0.25f;
+            const Occupancy occupancy(beam_);
+            const std::optional<Occupancy::Cut> cut = occupancy.best_cut(*cost_ > COST ? SH1 : SH0);
+            if (!force && !cut && (sorted_ || !occupancy.is_disordered(beam_)))
+                return false;
+            std::array<uint8_t, BeamPackets::MAX_RAYS> order;
+            const uint32_t active = occupancy.sorted(beam_, order);
+            for (uint32_t i = 0; i < active; ++i)
+                parts[cut ? occupancy.is_beyond(order[i], *cut) : force && i >= active / 2].add(
+                    rays_, first + order[i], first + order[i]);
+        }
+        for (const RegroupedRays &part : parts) {
+            if (part.count == 0)
+                continue;
+            typename Output::Buffer buffer;
+            const RayGroup group = part.group(rays_);
+            GroupTracer tracer(tree_, group, options_, nullptr, buffer.output(), counters_);
+            tracer.sorted_ = !beam_.any_stray;
+            tracer.cost_ = cost_;
+            tracer.trace_from(entry);
+            output_.scatter(buffer, part);
+        }
+        return true;
     }
 
     // Traces the given lanes of each packet.
@@ -247,6 +342,8 @@ private:
     Output output_;
     Counters &counters_;
     BeamPackets beam_;
+    float own_cost_ = 0, *cost_ = &own_cost_;
+    bool sorted_ = false; // rays are in the order of their slopes
 };
 
 template <typename Output>

@@ -1,6 +1,7 @@
 #include "mlrta/triangle_forms.h"
 
 #include "geometry/triangle_test.h"
+#include "traverse/parameter_interval.h"
 
 namespace mlrt {
 
@@ -9,25 +10,28 @@ namespace {
 // What exceeds these might overflow on the way to a form, what falls below might lose
 // digits to underflow.
 constexpr float LARGEST_SIZE = 0x1p40f, SMALLEST_VOLUME = 0x1p-100f;
+constexpr float SMALLEST_DEPTH = 0x1p-60f;
 
 // What underflow may take from a component of a normal, and from a volume by unit of size.
 constexpr float UNDERFLOW = 0x1p-146f;
 
 // Bounds on errors, in units of roundoff.
 //
-// Let s be the largest component of a vertex relative to the origin, e that of an edge, and
-// S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge once, so that
-// each product of a normal's component has three roundings and their difference a fourth: 4
-// of at most 2 s e. Dividing by the volume rounds twice more. Slopes have two roundings, and
-// evaluating a form two: 10 in a row, of at most 2 s e S each. Over a rectangle two roundings
-// lead to the form's value at the center, three to its change along a side, and five to the
-// sum of all: 16 in a row. That is 32 s e S; 40 covers products of roundings and the bound.
+// Edges: let s be the largest component of a vertex relative to the origin, e that of an
+// edge, and S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge once,
+// so that each product of a normal's component has three roundings and their difference a
+// fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes have two
+// roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over a
+// rectangle two roundings lead to the form's value at the center, three to its change along
+// a side, and five to the sum of all: 16 in a row. That is 32 s e S; 40 covers products of
+// roundings and the bound itself.
 constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
-// The same for a normal N, which is made of two edges: with e in the place of s.
-constexpr float PLANE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
-// The volume a.N has three terms of at most 2 s e^2 with the roundings of N, of a, of a
-// product and two sums: 8 in a row, 48 s e^2.
-constexpr float VOLUME_ROUNDINGS = 52 * FLOAT_ROUNDOFF;
+// Depth: N comes from double precision, where thin triangles keep its digits. With n its
+// largest component, 12 roundings of at most n S are left, and that of the bound.
+constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
+// The volume a.N in double: N has a difference, a product and another difference, the rest a
+// difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2.
+constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
 // What is certain of the volume: that no more than this share of it is error.
 constexpr float LARGEST_SHARE = 0.25f;
 
@@ -61,16 +65,20 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const Vec3<FloatBlock> va = vertex(0), vb = vertex(1), vc = vertex(2);
     const Vec3<FloatBlock> a = va - o, b = vb - o, c = vc - o;
     const Vec3<FloatBlock> ab = vb - va, bc = vc - vb, ca = va - vc;
-    const Vec3<FloatBlock> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab),
-                                         cross(ca, ab)};
-    const FloatBlock volume = dot(a, normals[DEPTH]);
+    const Vec3<DoubleBlock> da = to_double(va);
+    const Vec3<DoubleBlock> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
+    const Vec3<FloatBlock> normals[4] = {
+        cross(b, bc), cross(c, ca), cross(a, ab),
+        {FloatBlock(d_normal.x), FloatBlock(d_normal.y), FloatBlock(d_normal.z)}};
+    const FloatBlock volume(dot(da - to_double(o), d_normal));
 
     const FloatBlock size =
         maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
     const FloatBlock edge = maximum(largest_component(ab),
                                     maximum(largest_component(bc), largest_component(ca)));
     const FloatBlock volume_error =
-        (VOLUME_ROUNDINGS * size) * (edge * edge) + UNDERFLOW * (size + 1.0f);
+        float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
+        (2 * FLOAT_ROUNDOFF) * absolute(volume);
     const FloatBlock inverse = 1.0f / volume;
     const FloatBlock inverse_size = absolute(inverse);
     const FloatBlock share = volume_error * inverse_size;
@@ -87,7 +95,8 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const FloatBlock edge_bound =
         (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
     const FloatBlock depth_bound =
-        (PLANE_ROUNDINGS * (edge * edge) + UNDERFLOW) * sum * inverse_size;
+        (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) * sum *
+        inverse_size;
     store(edge_error, edge_bound);
 
     const SlopeRectangle &rectangle = beam.rectangle;
@@ -95,6 +104,42 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const FloatBlock cosine(rectangle.cosine), sine(rectangle.sine);
     const FloatBlock half_p(rectangle.half_p), half_q(rectangle.half_q);
     MaskOf<FloatBlock> inside = safe;
+
+    // Where the vertices lie in the rectangle. A slope has four roundings, a difference, two
+    // products and a sum follow, and the middle and extent of all: less than 16 of at most
+    // the greatest coordinate and S.
+    FloatBlock lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
+    for (const Vec3<FloatBlock> *vertex_seen : {&a, &b, &c}) {
+        const FloatBlock reciprocal = 1.0f / (vertex_seen->z * beam.side);
+        const FloatBlock du = vertex_seen->x * reciprocal - center_u;
+        const FloatBlock dv = vertex_seen->y * reciprocal - center_v;
+        const FloatBlock p = fused(du, cosine, dv * sine);
+        const FloatBlock q = fused(dv, cosine, -(du * sine));
+        lo_p = minimum(p, lo_p);
+        hi_p = maximum(p, hi_p);
+        lo_q = minimum(q, lo_q);
+        hi_q = maximum(q, hi_q);
+    }
+    const FloatBlock farthest = maximum(maximum(-lo_p, hi_p), maximum(-lo_q, hi_q));
+    const FloatBlock slack = (32 * FLOAT_ROUNDOFF) * (farthest + sum);
+    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
+                       SMALLEST_DEPTH;
+    const FloatBlock middle_p = select(ahead, 0.5f * (lo_p + hi_p), FloatBlock(0.0f));
+    const FloatBlock middle_q = select(ahead, 0.5f * (lo_q + hi_q), FloatBlock(0.0f));
+    const FloatBlock extent_p =
+        select(ahead, 0.5f * (hi_p - lo_p) + slack, FloatBlock(INFINITE));
+    const FloatBlock extent_q =
+        select(ahead, 0.5f * (hi_q - lo_q) + slack, FloatBlock(INFINITE));
+    inside &= (absolute(middle_p) <= extent_p + half_p) &
+              (absolute(middle_q) <= extent_q + half_q);
+    possible = to_bits(inside) & safe_bits;
+    if (possible == 0)
+        return;
+    store(box_p, middle_p);
+    store(box_q, middle_q);
+    store(box_half_p, extent_p);
+    store(box_half_q, extent_q);
+
     FloatBlock greatest;
     for (int form = 0; form < 4; ++form) {
         const FloatBlock form_u = normals[form].x * inverse;

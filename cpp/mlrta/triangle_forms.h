@@ -29,6 +29,10 @@ struct alignas(64) TriangleForms {
     // The same over the beam's rectangle: value = center + p * of_p + q * of_q.
     Lanes center[4], of_p[4], of_q[4];
 
+    // A rectangle around what the beam sees of the triangle, as those of packets are:
+    // infinite if a vertex does not lie ahead.
+    Lanes box_p, box_q, box_half_p, box_half_q;
+
     // A computed edge form is within edge_error of the exact one, anywhere in the beam. With
     // x a computed reciprocal depth, the exact one, if positive, is at least
     // x * depth_shrink - depth_error and at most x * depth_grow + depth_error.
