@@ -255,6 +255,14 @@ load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
 #endif
 }
 
+// Asks for the cache lines of an object that will be read soon.
+template <typename Object>
+void prefetch(const Object *object) {
+    const char *bytes = reinterpret_cast<const char *>(object);
+    __builtin_prefetch(bytes);
+    __builtin_prefetch(bytes + sizeof(Object) - 1);
+}
+
 // The same vector in all lanes.
 inline Vec3<FloatPacket> in_all_lanes(Vec3f v) {
     return {FloatPacket(v.x), FloatPacket(v.y), FloatPacket(v.z)};

@@ -1,6 +1,7 @@
 #include "mlrta/beam_leaf.h"
 
 #include "geometry/ray_packet.h"
+#include "mlrta/ray_grid.h"
 #include "mlrta/triangle_forms.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
@@ -43,6 +44,8 @@ struct CrossingDepths {
     float first, last;
 };
 
+static const uint32_t DENSE = getenv("DENSE") ? atoi(getenv("DENSE")) : 64;
+
 template <Query query>
 class BeamLeafTracer {
 public:
@@ -76,6 +79,7 @@ private:
     bool clip(Depths &depths) const;
     bool beside() const;
     void test_leaf(KdNode leaf);
+    void flush();
     void test_block(const uint32_t *numbers, uint32_t count);
     void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
     bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
@@ -90,6 +94,11 @@ private:
     BeamPackets &beam_;
     Counters &counters_;
     uint32_t triangles_left_;
+    uint32_t tested_ = 0;
+    bool dense_ = false; // whether there are many triangles
+    RayGrid grid_;       // where there are
+    std::array<uint32_t, 3 * BLOCK_WIDTH> waiting_;
+    uint32_t waiting_count_ = 0;
     Mailbox mailbox_;
     std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
     std::array<float, 6> cell_; // lower and upper bounds relative to the origin
@@ -230,6 +239,8 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
                 return false;
         }
         do {
+            if (pending == 0)
+                flush();
             if (pending == 0 || least_ == INFINITE)
                 return true;
             --pending;
@@ -245,23 +256,40 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
     }
 }
 
+// Where a beam meets many triangles, each leaf's are only fetched, to be tested when those
+// of the next have been as well: the memory has time to bring them, and blocks are full.
 template <Query query>
 void BeamLeafTracer<query>::test_leaf(KdNode leaf) {
-    std::array<uint32_t, BLOCK_WIDTH> numbers;
-    uint32_t count = 0;
     for (const uint32_t primitive : tree_.references_of(leaf)) {
         if (mailbox_.put(primitive))
             continue;
-        numbers[count++] = primitive;
-        if (count == BLOCK_WIDTH) {
-            test_block(numbers.data(), count);
-            count = 0;
+        waiting_[waiting_count_++] = primitive;
+        if (dense_) {
+            prefetch(&tree_.triangles[primitive]);
+            if (waiting_count_ == waiting_.size()) {
+                test_block(waiting_.data(), BLOCK_WIDTH);
+                waiting_count_ -= BLOCK_WIDTH;
+                std::copy_n(waiting_.begin() + BLOCK_WIDTH, waiting_count_, waiting_.begin());
+            }
+        } else if (waiting_count_ == BLOCK_WIDTH) {
+            flush();
         }
     }
-    if (count == 0)
-        return;
-    std::fill(numbers.begin() + count, numbers.end(), numbers[0]);
-    test_block(numbers.data(), count);
+    if (!dense_)
+        flush();
+}
+
+// Tests the triangles that wait.
+template <Query query>
+void BeamLeafTracer<query>::flush() {
+    std::array<uint32_t, BLOCK_WIDTH> numbers;
+    for (uint32_t first = 0; first < waiting_count_; first += BLOCK_WIDTH) {
+        const uint32_t count = std::min(waiting_count_ - first, BLOCK_WIDTH);
+        numbers.fill(waiting_[first]);
+        std::copy_n(waiting_.begin() + first, count, numbers.begin());
+        test_block(numbers.data(), count);
+    }
+    waiting_count_ = 0;
 }
 
 template <Query query>
@@ -272,7 +300,15 @@ void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) 
     const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
     counters_.beam_triangles += tested;
     triangles_left_ -= std::min(triangles_left_, tested);
+    tested_ += tested;
+    if (tested_ > DENSE && !dense_) {
+        grid_.fill(beam_);
+        dense_ = true;
+    }
     for_each_lane(forms.possible, [&](uint32_t lane) {
+        if (dense_ && !grid_.may_hit(forms.box_p[lane], forms.box_q[lane],
+                                     forms.box_half_p[lane], forms.box_half_q[lane]))
+            return;
         test_triangle(forms, lane, numbers[lane]);
     });
     for_each_lane(forms.unsafe, [&](uint32_t lane) {

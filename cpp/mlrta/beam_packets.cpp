@@ -184,7 +184,7 @@ void BeamPackets::fit_rectangle() {
     rectangle.center_u += mid_p * c - mid_q * s;
     rectangle.center_v += mid_p * s + mid_q * c;
     const float reach = std::max({-beam_p0, beam_p1, -beam_q0, beam_q1});
-    const float slack =
+    const float slack = rectangle.slack =
         FLOAT_ROUNDOFF * (64 * reach + 8 * (std::abs(rectangle.center_u) +
                                             std::abs(rectangle.center_v) + size_u + size_v));
     rectangle.half_p = 0.5f * (beam_p1 - beam_p0) + slack;

@@ -23,6 +23,7 @@ struct SlopeRectangle {
     float center_u = 0, center_v = 0;
     float cosine = 1, sine = 0;
     float half_p = 0, half_q = 0;
+    float slack = 0; // of the extents, for how p and q of a ray are rounded
 };
 
 // Sixteen rays of a beam and the best that they have found.
@@ -69,6 +70,16 @@ struct BeamPackets {
     // is, else as the rays spread.
     void load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
               const CameraMap *camera);
+
+    // Coordinates p and q of a packet's rays, to within the rectangle's slack.
+    FloatPacket along_p(const BeamPacket &packet) const {
+        return fused(packet.u - rectangle.center_u, FloatPacket(rectangle.cosine),
+                     (packet.v - rectangle.center_v) * rectangle.sine);
+    }
+    FloatPacket along_q(const BeamPacket &packet) const {
+        return fused(packet.v - rectangle.center_v, FloatPacket(rectangle.cosine),
+                     (packet.u - rectangle.center_u) * -rectangle.sine);
+    }
 
 private:
     bool choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count);

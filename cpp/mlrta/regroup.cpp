@@ -7,16 +7,10 @@ namespace mlrt {
 
 namespace {
 
-using Cells = FloatPacket;
-
 // Cells along p (axis 0) or q (axis 1) before each ray.
 FloatPacket cell_of(const BeamPackets &beam, const BeamPacket &packet, int axis) {
     const SlopeRectangle &r = beam.rectangle;
-    const FloatPacket u = packet.u - FloatPacket(r.center_u);
-    const FloatPacket v = packet.v - FloatPacket(r.center_v);
-    const FloatPacket along = axis == 0
-                                  ? fused(u, FloatPacket(r.cosine), v * r.sine)
-                                  : fused(v, FloatPacket(r.cosine), u * -r.sine);
+    const FloatPacket along = axis == 0 ? beam.along_p(packet) : beam.along_q(packet);
     const float half = axis == 0 ? r.half_p : r.half_q;
     const float scale = 0.5f * Occupancy::SIDE / half;
     return minimum(maximum(along * scale + 0.5f * Occupancy::SIDE, FloatPacket(0.0f)),
