@@ -70,18 +70,21 @@ Beam beam_of_rays(const Points &origins, const Points &directions, const Values 
 // The search with every decision of the beam looked up in tables: the tests replay the
 // figures of the literature with it.
 struct TableJudge {
+    struct Cell {};
+
     const std::set<uint32_t> &culled;
     const std::set<uint32_t> &impossible;
     std::vector<uint32_t> visited;
 
+    bool knows(const Box3f &) const { return true; }
+    Cell start(const Box3f &) const { return {}; }
+    Cell child(Cell, KdNode, bool) const { return {}; }
     void visit(uint32_t node) { visited.push_back(node); }
-    Sides sides(uint32_t, KdNode node, const Box3f &) const {
+    Sides sides(uint32_t, KdNode node, Cell) const {
         return {!culled.contains(node.lower_child()),
-                !culled.contains(node.lower_child() + 1)};
+                !culled.contains(node.lower_child() + 1), false};
     }
-    bool possible(uint32_t leaf, KdNode, const Box3f &) const {
-        return !impossible.contains(leaf);
-    }
+    bool possible(uint32_t leaf, KdNode, Cell) const { return !impossible.contains(leaf); }
 };
 
 // Children: inner nodes and their lower child; other nodes are leaves, empty or of one
@@ -109,6 +112,22 @@ std::optional<uint32_t> entry_point(const TreeHandle &handle, const Beam &beam,
     return entry ? std::optional(entry->node) : std::nullopt;
 }
 
+// Searches an entry point for each beam, `rounds` times over.
+Counters search_all(const TreeHandle &handle, const std::vector<Beam> &beams,
+                    const nb::dict &options, uint32_t rounds) {
+    const TraceOptions trace_options = trace_options_from(options);
+    const Entry root = root_entry(*handle.tree);
+    Counters counters;
+    for (uint32_t round = 0; round < rounds; ++round)
+        for (const Beam &beam : beams) {
+            BeamJudge judge(beam, trace_options, counters);
+            counters.tiles += 1;
+            counters.missed_tiles +=
+                !search_entry_point(handle.tree->nodes, root, judge).has_value();
+        }
+    return counters;
+}
+
 // (axis, split, lower child) of inner nodes and (3, number of references, 0) of leaves.
 std::vector<std::tuple<int, float, uint32_t>> nodes_of(const TreeHandle &handle) {
     std::vector<std::tuple<int, float, uint32_t>> result;
@@ -120,10 +139,9 @@ std::vector<std::tuple<int, float, uint32_t>> nodes_of(const TreeHandle &handle)
     return result;
 }
 
-const char *name_of(Cull cull) {
-    return cull == Cull::near_only  ? "near_only"
-           : cull == Cull::far_only ? "far_only"
-                                    : "both";
+const char *name_of(const Sides &sides) {
+    return sides.near ? (sides.far ? "both" : "near_only")
+                      : (sides.far ? "far_only" : "neither");
 }
 
 void bind_beam(nb::module_ &s) {
@@ -177,22 +195,25 @@ void bind_beam(nb::module_ &s) {
         nb::arg("first"), nb::arg("count"), nb::arg("t_max"),
         "Beam of a run of rays of the tile (x, y, size, samples), None if it is no "
         "rectangle.");
-    s.def("cull_children", [](const Beam &beam, const Point &lo, const Point &hi, int axis,
-                              double position) {
-        return name_of(cull_children(beam, box(lo, hi), {axis, position}));
-    });
-    s.def("upper_is_near", [](const Beam &beam, int axis, double position) {
-        return upper_is_near(beam, {axis, position});
+    s.def("cull_children",
+          [](const Beam &beam, const Point &lo, const Point &hi, int axis, float position) {
+              const InverseFrustum frustum(beam);
+              return name_of(frustum.sides(frustum.inside(box(lo, hi)), {axis, position}));
+          });
+    s.def("upper_is_near", [](const Beam &beam, int axis, float position) {
+        return InverseFrustum(beam).upper_is_near({axis, position});
     });
     s.def("may_enter_by_parameters",
           [](const Beam &beam, const Point &lo, const Point &hi) {
-              return may_enter_by_parameters(beam, box(lo, hi));
+              const InverseFrustum frustum(beam);
+              return frustum.may_enter_by_parameters(frustum.inside(box(lo, hi)));
           });
     s.def("may_enter_by_slopes", [](const Beam &beam, const Point &lo, const Point &hi) {
-        return may_enter_by_slopes(beam, box(lo, hi));
+        const InverseFrustum frustum(beam);
+        return frustum.may_enter_by_slopes(frustum.inside(box(lo, hi)));
     });
     s.def("may_enter_by_planes", [](const Beam &beam, const Point &lo, const Point &hi) {
-        return may_enter_by_planes(beam, box(lo, hi));
+        return may_enter_by_planes(beam, InverseFrustum(beam).inside(box(lo, hi)));
     });
 }
 
@@ -245,6 +266,14 @@ void bind_mlrta_selftest(nb::module_ &m) {
         "(first, count) of the parts of a tile, in order.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
+    s.def(
+        "search_all",
+        [](const TreeHandle &tree, const std::vector<Beam> &beams, const nb::dict &options,
+           uint32_t rounds) {
+            return counters_to_dict(search_all(tree, beams, options, rounds));
+        },
+        nb::arg("tree"), nb::arg("beams"), nb::arg("options"), nb::arg("rounds") = 1,
+        "Counters of searches of an entry point for each beam, some rounds over.");
     s.def("nodes_of", &nodes_of);
 }
 

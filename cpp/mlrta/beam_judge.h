@@ -11,43 +11,48 @@ namespace mlrt {
 
 class BeamJudge {
 public:
+    using Cell = BoxPacket; // see InverseFrustum
+
     BeamJudge(const Beam &beam, const TraceOptions &options, Counters &counters)
-        : beam_(beam), options_(options), counters_(counters) {}
+        : beam_(beam), frustum_(beam), options_(options), counters_(counters) {}
+
+    bool knows(const Box3f &box) const {
+        return InverseFrustum::within_range(frustum_.inside(box));
+    }
+    Cell start(const Box3f &box) const { return frustum_.inside(box); }
 
     void visit(uint32_t) { ++counters_.entry_steps; }
 
-    Sides sides(uint32_t, KdNode node, const Box3f &cell) const {
+    Sides sides(uint32_t, KdNode node, const Cell &cell) const {
         const AxisPlane plane{node.axis(), node.split()};
-        const bool upper_is_near = mlrt::upper_is_near(beam_, plane);
         switch (options_.culling) {
         case Culling::none:
             break;
         case Culling::frustum_planes: {
-            Box3f lower = cell, upper = cell;
-            lower.hi[plane.axis] = node.split();
-            upper.lo[plane.axis] = node.split();
-            return {may_enter_by_planes(beam_, lower), may_enter_by_planes(beam_, upper),
-                    upper_is_near};
+            const bool lower = may_enter_by_planes(beam_, child(cell, node, false));
+            const bool upper = may_enter_by_planes(beam_, child(cell, node, true));
+            if (frustum_.upper_is_near(plane))
+                return {upper, lower, true};
+            return {lower, upper, false};
         }
         case Culling::inverse_frustum:
-            const Cull cull = cull_children(beam_, cell, plane);
-            if (cull == Cull::near_only)
-                return {!upper_is_near, upper_is_near};
-            if (cull == Cull::far_only)
-                return {upper_is_near, !upper_is_near};
-            break;
+            return frustum_.sides(cell, plane);
         }
-        return {true, true, upper_is_near};
+        return {true, true, frustum_.upper_is_near(plane)};
     }
 
-    bool possible(uint32_t, KdNode, const Box3f &cell) const {
+    Cell child(const Cell &cell, KdNode node, bool upper) const {
+        return frustum_.child(cell, {node.axis(), node.split()}, upper);
+    }
+
+    bool possible(uint32_t, KdNode, const Cell &cell) const {
         if (options_.culling == Culling::frustum_planes)
             return may_enter_by_planes(beam_, cell);
         switch (options_.leaf_rejection) {
         case LeafRejection::parameters:
-            return may_enter_by_parameters(beam_, cell);
+            return frustum_.may_enter_by_parameters(cell);
         case LeafRejection::slopes:
-            return may_enter_by_slopes(beam_, cell);
+            return frustum_.may_enter_by_slopes(cell);
         case LeafRejection::none:
             break;
         }
@@ -56,6 +61,7 @@ public:
 
 private:
     const Beam &beam_;
+    InverseFrustum frustum_;
     const TraceOptions &options_;
     Counters &counters_;
 };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kdtree/tree.h"
+#include "mlrta/inverse_frustum.h"
 #include "traverse/query.h"
 
 #include <array>
@@ -11,52 +12,60 @@
 
 namespace mlrt {
 
-// What a search needs to know of a beam. Nodes are passed with their index and cell.
+// What a search needs to know of a beam:
 //
-//   Sides   sides(index, node, cell)      children that the beam may enter
-//   bool    possible(index, leaf, cell)   whether a non-empty leaf may be hit
-//   void    visit(index)                  called for each node that is looked at, in order
-struct Sides {
-    bool lower, upper;
-    bool upper_first = false; // order, if both
-};
+//   Cell                              what the judge wants to know of a node's cell
+//   bool  knows(box)                  whether it can judge what lies in that box at all
+//   Cell  start(box)                  the cell that is that box
+//   Sides sides(index, node, cell)    children that the beam may enter
+//   Cell  child(cell, node, upper)    the cell of a child
+//   bool  possible(index, leaf, cell) whether a non-empty leaf may be hit
+//   void  visit(index)                called for each node that is looked at, in order
 
 namespace entry_point_detail {
 
+// A node on a path from the start of a search, `depth` nodes below it.
+template <typename Cell>
 struct Place {
     uint32_t node;
-    Box3f cell;
+    int depth;
+    Cell cell;
 };
 
 // A node both of whose children may be entered, and the one that waits.
+template <typename Cell>
 struct Bifurcation {
-    Place at, other;
+    uint32_t node;
+    Place<Cell> other;
 };
 
-inline Place child_of(const Place &place, KdNode node, bool upper) {
-    Place child{node.lower_child() + upper, place.cell};
-    (upper ? child.cell.lo : child.cell.hi)[node.axis()] = node.split();
-    return child;
-}
+template <typename Cell>
+using BifurcationStack = std::array<Bifurcation<Cell>, MAX_TREE_DEPTH + 1>;
+using NodePath = std::array<uint32_t, MAX_TREE_DEPTH + 1>;
 
 // Goes down from `place` to the first possible leaf, near children first; pushes what
 // waits. Where a path ends without one the waiting child of the latest bifurcation is
-// tried.
-template <typename Judge, typename Stack>
-bool find_leaf(std::span<const KdNode> nodes, Place &place, Judge &judge, Stack &stack,
-               int &pending) {
+// tried. Records the nodes from the start to the leaf by depth.
+template <typename Judge, typename Cell>
+bool find_leaf(std::span<const KdNode> nodes, Place<Cell> &place, Judge &judge,
+               BifurcationStack<Cell> &stack, int &pending, NodePath &path) {
     for (;;) {
         const KdNode node = load_node(nodes[place.node]);
         judge.visit(place.node);
+        path[size_t(place.depth)] = place.node;
         if (!node.is_leaf()) {
             const Sides sides = judge.sides(place.node, node, place.cell);
-            if (sides.lower && sides.upper) {
-                stack[pending++] = {place, child_of(place, node, !sides.upper_first)};
-                place = child_of(place, node, sides.upper_first);
-                continue;
-            }
-            if (sides.lower || sides.upper) {
-                place = child_of(place, node, sides.upper);
+            const bool to_upper = sides.near == sides.upper_is_near;
+            const uint32_t next = node.lower_child() + to_upper;
+            if (sides.near && sides.far)
+                stack[size_t(pending++)] = {place.node,
+                                            {node.lower_child() + !to_upper,
+                                             place.depth + 1,
+                                             judge.child(place.cell, node, !to_upper)}};
+            if (sides.near || sides.far) {
+                place.cell = judge.child(place.cell, node, to_upper);
+                place.node = next;
+                ++place.depth;
                 continue;
             }
         } else if (node.reference_count() > 0 &&
@@ -67,8 +76,21 @@ bool find_leaf(std::span<const KdNode> nodes, Place &place, Judge &judge, Stack 
             return false;
         // Its first side was barren, so this node is no bifurcation: it leaves the stack
         // for good.
-        place = stack[--pending].other;
+        place = stack[size_t(--pending)].other;
     }
+}
+
+// The node `depth` nodes below the start of a path.
+inline Entry entry_at(std::span<const KdNode> nodes, const Entry &start,
+                      const NodePath &path, int depth) {
+    Entry entry = start;
+    for (size_t i = 0; i < size_t(depth); ++i) {
+        const KdNode node = load_node(nodes[path[i]]);
+        const bool upper = path[i + 1] != node.lower_child();
+        (upper ? entry.cell.lo : entry.cell.hi)[node.axis()] = node.split();
+    }
+    entry.node = path[size_t(depth)];
+    return entry;
 }
 
 } // namespace entry_point_detail
@@ -84,21 +106,24 @@ template <typename Judge>
 std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Entry &start,
                                         Judge &judge) {
     using namespace entry_point_detail;
-    std::array<Bifurcation, MAX_TREE_DEPTH + 1> stack;
-    std::array<Bifurcation, MAX_TREE_DEPTH + 1> side_stack;
+    using Cell = typename Judge::Cell;
+    if (!judge.knows(start.cell))
+        return start;
+    BifurcationStack<Cell> stack, side_stack;
+    NodePath path, side_path;
     int frozen = 0;
-    Place place{start.node, start.cell};
-    if (!find_leaf(nodes, place, judge, stack, frozen))
+    Place<Cell> place{start.node, 0, judge.start(start.cell)};
+    if (!find_leaf(nodes, place, judge, stack, frozen, path))
         return std::nullopt;
-    Entry candidate{place.node, place.cell};
+    int candidate = place.depth;
     while (frozen > 0) {
-        const Bifurcation &bifurcation = stack[--frozen];
-        Place other = bifurcation.other;
+        Place<Cell> other = stack[size_t(--frozen)].other;
+        const int depth = other.depth - 1;
         int pending = 0;
-        if (find_leaf(nodes, other, judge, side_stack, pending))
-            candidate = {bifurcation.at.node, bifurcation.at.cell};
+        if (find_leaf(nodes, other, judge, side_stack, pending, side_path))
+            candidate = depth;
     }
-    return candidate;
+    return entry_at(nodes, start, path, candidate);
 }
 
 } // namespace mlrt

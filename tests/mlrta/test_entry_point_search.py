@@ -158,10 +158,8 @@ def judge(core: ModuleType, beam: Any, rejection: str) -> tuple[Any, Any]:
     def cull(lo: Any, hi: Any, axis: int, split: float) -> tuple[bool, bool]:
         answer = s.cull_children(beam, lo, hi, axis, split)
         upper = s.upper_is_near(beam, axis, split)
-        return (
-            answer == "both" or (answer == "near_only") != upper,
-            answer == "both" or (answer == "near_only") == upper,
-        )
+        sides = answer in ("near_only", "both"), answer in ("far_only", "both")
+        return sides[::-1] if upper else sides
 
     tests = {
         "slopes": lambda lo, hi: s.may_enter_by_slopes(beam, lo, hi),
