@@ -14,7 +14,8 @@ public:
     using Cell = BoxPacket; // see InverseFrustum
 
     BeamJudge(const Beam &beam, const TraceOptions &options, Counters &counters)
-        : beam_(beam), frustum_(beam), options_(options), counters_(counters) {}
+        : beam_(beam), frustum_(beam), culling_(options.culling),
+          leaf_rejection_(options.leaf_rejection), counters_(counters) {}
 
     bool knows(const Box3f &box) const {
         return InverseFrustum::within_range(frustum_.inside(box));
@@ -25,20 +26,15 @@ public:
 
     Sides sides(uint32_t, KdNode node, const Cell &cell) const {
         const AxisPlane plane{node.axis(), node.split()};
-        switch (options_.culling) {
-        case Culling::none:
-            break;
-        case Culling::frustum_planes: {
-            const bool lower = may_enter_by_planes(beam_, child(cell, node, false));
-            const bool upper = may_enter_by_planes(beam_, child(cell, node, true));
-            if (frustum_.upper_is_near(plane))
-                return {upper, lower, true};
-            return {lower, upper, false};
-        }
-        case Culling::inverse_frustum:
+        if (culling_ == Culling::inverse_frustum) [[likely]]
             return frustum_.sides(cell, plane);
+        bool lower = true, upper = true;
+        if (culling_ == Culling::frustum_planes) {
+            lower = may_enter_by_planes(beam_, child(cell, node, false));
+            upper = may_enter_by_planes(beam_, child(cell, node, true));
         }
-        return {true, true, frustum_.upper_is_near(plane)};
+        return frustum_.upper_is_near(plane) ? Sides{upper, lower, true}
+                                             : Sides{lower, upper, false};
     }
 
     Cell child(const Cell &cell, KdNode node, bool upper) const {
@@ -46,9 +42,9 @@ public:
     }
 
     bool possible(uint32_t, KdNode, const Cell &cell) const {
-        if (options_.culling == Culling::frustum_planes)
+        if (culling_ == Culling::frustum_planes)
             return may_enter_by_planes(beam_, cell);
-        switch (options_.leaf_rejection) {
+        switch (leaf_rejection_) {
         case LeafRejection::parameters:
             return frustum_.may_enter_by_parameters(cell);
         case LeafRejection::slopes:
@@ -62,7 +58,8 @@ public:
 private:
     const Beam &beam_;
     InverseFrustum frustum_;
-    const TraceOptions &options_;
+    Culling culling_;
+    LeafRejection leaf_rejection_;
     Counters &counters_;
 };
 

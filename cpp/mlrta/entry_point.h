@@ -7,6 +7,7 @@
 #include "traverse/query.h"
 
 #include <array>
+#include <bit>
 #include <optional>
 #include <span>
 
@@ -43,40 +44,56 @@ template <typename Cell>
 using BifurcationStack = std::array<Bifurcation<Cell>, MAX_TREE_DEPTH + 1>;
 using NodePath = std::array<uint32_t, MAX_TREE_DEPTH + 1>;
 
+// As a value, where ?: would choose between places in memory.
+inline KdNode chosen(bool second, KdNode a, KdNode b) {
+    return std::bit_cast<KdNode>(second ? std::bit_cast<uint64_t>(b)
+                                        : std::bit_cast<uint64_t>(a));
+}
+
 // Goes down from `place` to the first possible leaf, near children first; pushes what
 // waits. Where a path ends without one the waiting child of the latest bifurcation is
 // tried. Records the nodes from the start to the leaf by depth.
 template <typename Judge, typename Cell>
 bool find_leaf(std::span<const KdNode> nodes, Place<Cell> &place, Judge &judge,
                BifurcationStack<Cell> &stack, int &pending, NodePath &path) {
+    // Apart, so that they stay in registers.
+    uint32_t index = place.node;
+    int depth = place.depth;
+    Cell cell = place.cell;
+    KdNode node = load_node(nodes[index]);
     for (;;) {
-        const KdNode node = load_node(nodes[place.node]);
-        judge.visit(place.node);
-        path[size_t(place.depth)] = place.node;
+        judge.visit(index);
+        path[size_t(depth)] = index;
         if (!node.is_leaf()) {
-            const Sides sides = judge.sides(place.node, node, place.cell);
+            // Read both before the choice between them is known.
+            const KdNode lower = load_node(nodes[node.lower_child()]);
+            const KdNode upper = load_node(nodes[node.lower_child() + 1]);
+            const Sides sides = judge.sides(index, node, cell);
             const bool to_upper = sides.near == sides.upper_is_near;
-            const uint32_t next = node.lower_child() + to_upper;
             if (sides.near && sides.far)
-                stack[size_t(pending++)] = {place.node,
-                                            {node.lower_child() + !to_upper,
-                                             place.depth + 1,
-                                             judge.child(place.cell, node, !to_upper)}};
+                stack[size_t(pending++)] = {index,
+                                            {node.lower_child() + !to_upper, depth + 1,
+                                             judge.child(cell, node, !to_upper)}};
             if (sides.near || sides.far) {
-                place.cell = judge.child(place.cell, node, to_upper);
-                place.node = next;
-                ++place.depth;
+                cell = judge.child(cell, node, to_upper);
+                index = node.lower_child() + to_upper;
+                ++depth;
+                node = chosen(to_upper, lower, upper);
                 continue;
             }
-        } else if (node.reference_count() > 0 &&
-                   judge.possible(place.node, node, place.cell)) {
+        } else if (node.reference_count() > 0 && judge.possible(index, node, cell)) {
+            place = {index, depth, cell};
             return true;
         }
         if (pending == 0)
             return false;
         // Its first side was barren, so this node is no bifurcation: it leaves the stack
         // for good.
-        place = stack[size_t(--pending)].other;
+        const Place<Cell> &other = stack[size_t(--pending)].other;
+        index = other.node;
+        depth = other.depth;
+        cell = other.cell;
+        node = load_node(nodes[index]);
     }
 }
 

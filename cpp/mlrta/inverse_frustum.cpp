@@ -19,36 +19,36 @@ float raised(double x) {
     return float(std::max(x + MARGIN * std::abs(x) + LEAST, -GREATEST));
 }
 
-std::array<float, 8> lanes_of(const BoxPacket &inside) {
-    alignas(32) std::array<float, 8> lanes;
-    store(lanes.data(), inside);
-    return lanes;
-}
-
 } // namespace
 
 InverseFrustum::InverseFrustum(const Beam &beam) {
-    for (int k = 0; k < 3; ++k) {
+    for (size_t k = 0; k < 3; ++k) {
         Axis &axis = axes_[k];
+        const bool upward = beam.heading[k] == Heading::positive;
         // Origins are floats. Adding zero makes -0 positive.
         axis.first_origin = float(beam.origin[k].lo) + 0.0f;
         axis.last_origin = float(beam.origin[k].hi) + 0.0f;
-        axis.heading = int(beam.heading[k]);
-        if (axis.heading == 0)
-            continue;
-        const double sign = axis.heading;
+        axis.heading = float(beam.heading[k]);
+        axis.nearest_origin = upward ? axis.last_origin : axis.first_origin;
+        axis.farthest_origin = upward ? axis.first_origin : axis.last_origin;
+        axis.entry_face = uint32_t(upward ? k : k + 4);
+        axis.exit_face = uint32_t(upward ? k + 4 : k);
         alignas(32) std::array<float, 8> outward;
-        outward.fill(-std::numeric_limits<float>::infinity());
-        for (int step = 1; step < 3; ++step) {
-            const int j = (k + step) % 3;
-            const double a = sign * beam.slope[k][j].lo, b = sign * beam.slope[k][j].hi;
-            outward[size_t(j)] = lowered(-std::max(a, b));
-            outward[size_t(j) + 4] = lowered(std::min(a, b));
+        outward.fill(std::numeric_limits<float>::quiet_NaN());
+        if (axis.heading != 0) {
+            const double sign = axis.heading;
+            for (size_t step = 1; step < 3; ++step) {
+                const size_t j = (k + step) % 3;
+                const Range &slope = beam.slope[k][j];
+                outward[j] = lowered(upward ? -slope.hi : slope.lo);
+                outward[j + 4] = lowered(upward ? slope.lo : -slope.hi);
+            }
+            const Range &reciprocal = beam.reciprocal[k];
+            const double a = sign * reciprocal.lo, b = sign * reciprocal.hi;
+            least_reciprocal_[k] = std::min(a, b) * (1 - MARGIN);
+            greatest_reciprocal_[k] = std::max(a, b) * (1 + MARGIN);
         }
         axis.outward_slope = load<BoxPacket>(outward.data());
-        const double a = sign * beam.reciprocal[k].lo, b = sign * beam.reciprocal[k].hi;
-        axis.least_reciprocal = std::max(lowered(std::min(a, b)), 0.0f);
-        axis.greatest_reciprocal = raised(std::max(a, b));
     }
     shorten(beam.t_max);
 }
@@ -57,65 +57,41 @@ InverseFrustum::InverseFrustum(const Beam &beam) {
 // may be half a unit in the last place less than the exact one.
 void InverseFrustum::shorten(double t_max) {
     constexpr double ROUNDED = 1 + 0x1p-23, SMALLEST_FLOAT = 0x1p-149;
+    constexpr float INFINITE = std::numeric_limits<float>::infinity();
     const double end = t_max * ROUNDED + SMALLEST_FLOAT;
-    for (Axis &axis : axes_)
-        if (axis.heading != 0)
-            axis.reach = raised(end / axis.least_reciprocal);
-}
-
-// What both modes of step 2 begin with: the cell lies behind the beam or beyond its end.
-bool InverseFrustum::out_of_reach(const std::array<float, 8> &inside) const {
+    alignas(32) std::array<float, 8> least;
+    least.fill(-INFINITE);
     for (size_t k = 0; k < 3; ++k) {
-        const int heading = axes_[k].heading;
-        if (heading == 0)
+        Axis &axis = axes_[k];
+        axis.reach = INFINITE;
+        if (axis.heading == 0)
             continue;
-        const float exit = inside[heading > 0 ? k + 4 : k];
-        const float entry = -inside[heading > 0 ? k : k + 4];
-        if (exit < 0 || entry > axes_[k].reach)
-            return true;
+        axis.reach = raised(end / least_reciprocal_[k]);
+        least[axis.entry_face] = -axis.reach;
+        least[axis.exit_face] = 0;
     }
-    return false;
+    least_inside_ = load<BoxPacket>(least.data());
 }
 
 bool InverseFrustum::may_enter_by_parameters(const BoxPacket &inside) const {
-    const std::array<float, 8> face = lanes_of(inside);
-    if (out_of_reach(face))
+    if (out_of_reach(inside))
         return false;
-    // Products of two floats are exact in double.
+    alignas(32) std::array<float, 8> face;
+    store(face.data(), inside);
     double latest_entry = 0;
     double earliest_exit = std::numeric_limits<double>::infinity();
     for (size_t k = 0; k < 3; ++k) {
         const Axis &axis = axes_[k];
         if (axis.heading == 0)
             continue;
-        const double entry = -face[axis.heading > 0 ? k : k + 4];
-        const double exit = face[axis.heading > 0 ? k + 4 : k];
-        latest_entry = std::max(latest_entry, entry * axis.least_reciprocal);
-        earliest_exit = std::min(earliest_exit, exit * axis.greatest_reciprocal);
+        latest_entry =
+            std::max(latest_entry, -face[axis.entry_face] * least_reciprocal_[k]);
+        earliest_exit =
+            std::min(earliest_exit, face[axis.exit_face] * greatest_reciprocal_[k]);
     }
     // The pairs of unlike axes are the six comparisons; a slab is never left before it is
     // entered.
     return latest_entry <= earliest_exit;
-}
-
-// A ray that starts past the exit face never meets the cell, so that the others matter
-// only: they leave the slab after a distance of at most that of the exit face. What a ray
-// has moved outward by then is at least that distance times M, or, if M is positive, zero,
-// and a face with all origins outside of it has inside() < 0.
-bool InverseFrustum::may_enter_by_slopes(const BoxPacket &inside) const {
-    const std::array<float, 8> face = lanes_of(inside);
-    if (out_of_reach(face))
-        return false;
-    const LaneBits start_outside = to_bits(inside < BoxPacket(0.0f));
-    for (size_t k = 0; k < 3; ++k) {
-        const Axis &axis = axes_[k];
-        if (axis.heading == 0)
-            continue;
-        const float exit = face[axis.heading > 0 ? k + 4 : k];
-        if ((to_bits(exit * axis.outward_slope > inside) & start_outside) != 0)
-            return false;
-    }
-    return true;
 }
 
 } // namespace mlrt

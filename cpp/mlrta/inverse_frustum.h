@@ -85,31 +85,24 @@ public:
     // Step 1, at an inner node.
     Sides sides(const BoxPacket &inside, AxisPlane plane) const {
         const Axis &axis = axes_[plane.axis];
-        const float up = plane.position - axis.last_origin;
-        const float down = axis.first_origin - plane.position;
-        const bool upward = axis.heading > 0;
-        const float nearest = upward ? up : down;
-        const float farthest = upward ? -down : -up;
-        Sides sides{true, true, down > 0};
-        // Otherwise rays start on both sides or in the plane, or their headings differ.
-        if (axis.heading == 0 || !(nearest > 0 || farthest < 0))
-            return sides;
-        if (farthest < 0 || nearest > axis.reach) {
-            sides.far = false;
-            return sides;
-        }
-        // Where the rays cross the plane they are outside of these faces.
+        const float nearest = axis.heading * (plane.position - axis.nearest_origin);
+        const float farthest = axis.heading * (plane.position - axis.farthest_origin);
+        const bool upper = upper_is_near(plane);
+        // If not, then rays start on both sides or in the plane, their headings differ, or
+        // all of them move away from it.
+        if (!(nearest > 0))
+            return {true, !(farthest < 0), upper};
         BoxPacket moved = nearest * axis.outward_slope;
         if (nearest != farthest)
             moved = minimum(moved, BoxPacket(farthest * axis.outward_slope));
+        // Where the rays cross the plane they are outside of these faces. If all rays start
+        // outside of such a face, none has reached its inner side yet, and they can meet
+        // the cell only beyond the plane. If not, all of them move outward: those that
+        // started inside have left, the others move away.
         const LaneBits outside = to_bits(moved > inside);
-        // If all rays start outside of such a face, none has reached its inner side yet,
-        // and they can meet the cell only beyond the plane. If not, all of them move
-        // outward: those that started inside have left, the others move away.
         const LaneBits start_outside = to_bits(inside < BoxPacket(0.0f));
-        sides.near = (outside & start_outside) == 0;
-        sides.far = (outside & ~start_outside) == 0;
-        return sides;
+        return {(outside & start_outside) == 0,
+                (outside & ~start_outside) == 0 && !(nearest > axis.reach), upper};
     }
 
     // Step 2, at a leaf: whether a ray of the beam may pass through its cell.
@@ -122,22 +115,46 @@ public:
     // Mode S: the same question through slopes, where the beam leaves one slab has it
     // reached the other? Tighter, because a slope keeps the correlation of d_j and d_k that
     // mode P loses.
-    bool may_enter_by_slopes(const BoxPacket &inside) const;
+    //
+    // A ray that starts past the exit face never meets the cell, so that the others matter
+    // only: they leave the slab after a distance of at most that of the exit face. What a
+    // ray has moved outward by then is at least that distance times M, or, if M is
+    // positive, zero; and where all origins lie outside of a face inside() is negative.
+    bool may_enter_by_slopes(const BoxPacket &inside) const {
+        if (out_of_reach(inside))
+            return false;
+        const LaneBits start_outside = to_bits(inside < BoxPacket(0.0f));
+        if (start_outside == 0)
+            return true;
+        alignas(32) std::array<float, 8> face;
+        store(face.data(), inside);
+        LaneBits still_outside = 0;
+        for (const Axis &axis : axes_)
+            still_outside |= to_bits(face[axis.exit_face] * axis.outward_slope > inside);
+        return (still_outside & start_outside) == 0;
+    }
 
 private:
     struct alignas(64) Axis {
-        // Lower bounds of d_j / |d_k| outward of each face, for k this axis; minus infinity
-        // for faces across it.
+        // Lower bounds of d_j / |d_k| outward of each face, for k this axis; not a number
+        // for faces across it, or if its heading is mixed.
         BoxPacket outward_slope;
         float first_origin, last_origin;
-        int heading; // sign of d_k, 0 if mixed: then nothing else is used
-        float reach; // no ray goes farther along this axis
-        float least_reciprocal, greatest_reciprocal; // of |d_k|
+        float heading;                         // sign of d_k, 0 if mixed
+        float nearest_origin, farthest_origin; // from what lies ahead
+        float reach;                           // no ray goes farther along this axis
+        uint32_t entry_face, exit_face;        // lanes
     };
 
-    bool out_of_reach(const std::array<float, 8> &inside) const;
+    // What both modes of step 2 begin with: the cell lies behind the beam or beyond its
+    // end.
+    bool out_of_reach(const BoxPacket &inside) const {
+        return to_bits(inside < least_inside_) != 0;
+    }
 
     std::array<Axis, 3> axes_;
+    BoxPacket least_inside_; // of cells that may be reached
+    std::array<double, 3> least_reciprocal_, greatest_reciprocal_; // of |d_k|
 };
 
 } // namespace mlrt
