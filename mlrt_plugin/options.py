@@ -13,6 +13,7 @@ TRACE_OPTIONS = (
     "split_factor",
     "leaf_rejection",
     "culling",
+    "search_order",
 )
 """Fields of ``TraceOptions`` in ``cpp/mlrta/trace.h``."""
 

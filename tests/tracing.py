@@ -43,6 +43,7 @@ ENTRY_POINTS: dict[str, Options] = {
     "leaf rejection by parameters": _entry_points(leaf_rejection="parameters"),
     "frustum planes": _entry_points(culling="frustum_planes"),
     "no culling": _entry_points(culling="none"),
+    "paper's search order": _entry_points(search_order="paper"),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
 }

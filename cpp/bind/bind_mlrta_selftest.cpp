@@ -92,13 +92,15 @@ struct TableJudge {
 std::pair<std::optional<uint32_t>, std::vector<uint32_t>>
 search_table(uint32_t node_count, const std::map<uint32_t, uint32_t> &children,
              const std::set<uint32_t> &empty_leaves, const std::set<uint32_t> &culled,
-             const std::set<uint32_t> &impossible) {
+             const std::set<uint32_t> &impossible, bool shallow_first) {
     std::vector<KdNode> nodes;
     for (uint32_t i = 0; i < node_count; ++i)
         nodes.push_back(children.contains(i) ? KdNode::inner(0, 0.5f, children.at(i))
                                              : KdNode::leaf(0, !empty_leaves.contains(i)));
     TableJudge judge{culled, impossible, {}};
-    const auto entry = search_entry_point(nodes, Entry{0, {{0, 0, 0}, {1, 1, 1}}}, judge);
+    const auto entry =
+        search_entry_point(nodes, Entry{0, {{0, 0, 0}, {1, 1, 1}}}, judge,
+                           shallow_first ? SearchOrder::shallow_first : SearchOrder::paper);
     return {entry ? std::optional(entry->node) : std::nullopt, judge.visited};
 }
 
@@ -107,8 +109,8 @@ std::optional<uint32_t> entry_point(const TreeHandle &handle, const Beam &beam,
     const TraceOptions trace_options = trace_options_from(options);
     Counters counters;
     BeamJudge judge(beam, trace_options, counters);
-    const auto entry =
-        search_entry_point(handle.tree->nodes, root_entry(*handle.tree), judge);
+    const auto entry = search_entry_point(handle.tree->nodes, root_entry(*handle.tree),
+                                          judge, trace_options.search_order);
     return entry ? std::optional(entry->node) : std::nullopt;
 }
 
@@ -122,8 +124,9 @@ Counters search_all(const TreeHandle &handle, const std::vector<Beam> &beams,
         for (const Beam &beam : beams) {
             BeamJudge judge(beam, trace_options, counters);
             counters.tiles += 1;
-            counters.missed_tiles +=
-                !search_entry_point(handle.tree->nodes, root, judge).has_value();
+            counters.missed_tiles += !search_entry_point(handle.tree->nodes, root, judge,
+                                                         trace_options.search_order)
+                                          .has_value();
         }
     return counters;
 }
@@ -251,6 +254,7 @@ void bind_mlrta_selftest(nb::module_ &m) {
     bind_beam(s);
     s.def("search_table", &search_table, nb::arg("node_count"), nb::arg("children"),
           nb::arg("empty_leaves"), nb::arg("culled"), nb::arg("impossible"),
+          nb::arg("shallow_first"),
           "Entry node (or None) and the nodes visited, in order, for a tree and decisions "
           "given "
           "as tables; the lower child is the near one.");

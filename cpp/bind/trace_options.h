@@ -33,6 +33,10 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                               {"inverse_frustum", Culling::inverse_frustum},
                                               {"frustum_planes", Culling::frustum_planes}},
                                              options.culling);
+    options.search_order = fields.choice<SearchOrder>(
+        "search_order",
+        {{"paper", SearchOrder::paper}, {"shallow_first", SearchOrder::shallow_first}},
+        options.search_order);
     fields.finish();
     if (options.initial_tile == 0 || options.minimum_tile == 0)
         refuse_value(

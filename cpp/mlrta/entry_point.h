@@ -112,16 +112,23 @@ inline Entry entry_at(std::span<const KdNode> nodes, const Entry &start,
 
 } // namespace entry_point_detail
 
-// E1, the search in the paper's order. Returns the deepest node whose subtree holds every
-// leaf that the beam may hit, or nothing if there is no such leaf.
+// Order in which the second phase of a search asks the bifurcations.
+enum class SearchOrder : uint32_t {
+    paper,         // E1: from the latest up
+    shallow_first, // E2: from the first down, which can stop at the first success
+};
+
+// Returns the deepest node whose subtree holds every leaf that the beam may hit, or nothing
+// if there is no such leaf.
 //
 // Phase 1 goes down to the first possible leaf. The bifurcations on the way are then
-// frozen: from the latest up, each is the new candidate if its other side holds a possible
-// leaf. Bifurcations inside those other sides are of no interest, since they lie below the
+// frozen, and the answer is the first of them whose other side holds a possible leaf too,
+// or the leaf itself. In the paper's order each one that does is the new candidate.
+// Bifurcations inside those other sides are of no interest, since they lie below the
 // candidate; they have a stack of their own.
 template <typename Judge>
 std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Entry &start,
-                                        Judge &judge) {
+                                        Judge &judge, SearchOrder order) {
     using namespace entry_point_detail;
     using Cell = typename Judge::Cell;
     if (!judge.knows(start.cell))
@@ -133,12 +140,16 @@ std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Ent
     if (!find_leaf(nodes, place, judge, stack, frozen, path))
         return std::nullopt;
     int candidate = place.depth;
-    while (frozen > 0) {
-        Place<Cell> other = stack[size_t(--frozen)].other;
+    for (int i = 0; i < frozen; ++i) {
+        const bool shallow_first = order == SearchOrder::shallow_first;
+        Place<Cell> other = stack[size_t(shallow_first ? i : frozen - 1 - i)].other;
         const int depth = other.depth - 1;
         int pending = 0;
-        if (find_leaf(nodes, other, judge, side_stack, pending, side_path))
+        if (find_leaf(nodes, other, judge, side_stack, pending, side_path)) {
             candidate = depth;
+            if (shallow_first)
+                break;
+        }
     }
     return entry_at(nodes, start, path, candidate);
 }

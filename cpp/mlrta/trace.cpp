@@ -88,7 +88,8 @@ private:
             beam = ray_beam(rays_, first, count);
         BeamJudge judge(beam, options_, counters_);
         const std::optional<Entry> entry =
-            search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge);
+            search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge,
+                               options_.search_order);
         if (!entry) {
             ++counters_.missed_tiles;
             return;

@@ -4,6 +4,7 @@
 #include "base/counters.h"
 #include "kdtree/tree.h"
 #include "mlrta/beam.h"
+#include "mlrta/entry_point.h"
 #include "traverse/ray_group.h"
 
 #include <cstdint>
@@ -42,6 +43,7 @@ struct TraceOptions {
     uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
+    SearchOrder search_order = SearchOrder::shallow_first;
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,
