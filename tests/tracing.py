@@ -44,6 +44,7 @@ ENTRY_POINTS: dict[str, Options] = {
     "frustum planes": _entry_points(culling="frustum_planes"),
     "no culling": _entry_points(culling="none"),
     "paper's search order": _entry_points(search_order="paper"),
+    "no covering triangles": _entry_points(covering_triangles=False),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
 }

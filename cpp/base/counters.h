@@ -17,6 +17,9 @@ struct Counters {
     uint64_t exact_tests = 0;     // ... and that double precision left undecided
     uint64_t tiles = 0;           // tiles for which an entry point was searched
     uint64_t missed_tiles = 0;    // tiles that no leaf can hold a hit for
+    uint64_t splits = 0;          // tiles that were split
+    uint64_t fallbacks = 0;       // tiles whose beam says nothing: no search was possible
+    uint64_t blockers = 0;        // triangles found to cover a tile's beam
 
     Counters &operator+=(const Counters &other) {
         rays += other.rays;
@@ -30,6 +33,9 @@ struct Counters {
         exact_distances += other.exact_distances;
         tiles += other.tiles;
         missed_tiles += other.missed_tiles;
+        splits += other.splits;
+        fallbacks += other.fallbacks;
+        blockers += other.blockers;
         return *this;
     }
 };

@@ -85,6 +85,9 @@ struct TableJudge {
                 !culled.contains(node.lower_child() + 1), false};
     }
     bool possible(uint32_t leaf, KdNode, Cell) const { return !impossible.contains(leaf); }
+    void found(uint32_t, KdNode) const {}
+    bool found_blocker() const { return false; }
+    bool reaches(Cell) const { return true; }
 };
 
 // Children: inner nodes and their lower child; other nodes are leaves, empty or of one
@@ -108,7 +111,7 @@ std::optional<uint32_t> entry_point(const TreeHandle &handle, const Beam &beam,
                                     const nb::dict &options) {
     const TraceOptions trace_options = trace_options_from(options);
     Counters counters;
-    BeamJudge judge(beam, trace_options, counters);
+    BeamJudge judge(*handle.tree, beam, trace_options, counters);
     const auto entry = search_entry_point(handle.tree->nodes, root_entry(*handle.tree),
                                           judge, trace_options.search_order);
     return entry ? std::optional(entry->node) : std::nullopt;
@@ -122,7 +125,7 @@ Counters search_all(const TreeHandle &handle, const std::vector<Beam> &beams,
     Counters counters;
     for (uint32_t round = 0; round < rounds; ++round)
         for (const Beam &beam : beams) {
-            BeamJudge judge(beam, trace_options, counters);
+            BeamJudge judge(*handle.tree, beam, trace_options, counters);
             counters.tiles += 1;
             counters.missed_tiles += !search_entry_point(handle.tree->nodes, root, judge,
                                                          trace_options.search_order)
@@ -161,6 +164,7 @@ void bind_beam(nb::module_ &s) {
                      })
         .def("slope", [](const Beam &b, size_t k, size_t j) { return pair(b.slope[k][j]); })
         .def("reciprocal", [](const Beam &b, size_t k) { return pair(b.reciprocal[k]); })
+        .def_ro("t_min", &Beam::t_min)
         .def_ro("t_max", &Beam::t_max)
         .def_ro("has_planes", &Beam::has_planes)
         .def_ro("plane_slack", &Beam::plane_slack)
@@ -177,7 +181,7 @@ void bind_beam(nb::module_ &s) {
         [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
            double x0, double x1, double y0, double y1, double t_max) {
             return camera_beam({vec(origin), vec(base), vec(dx), vec(dy)}, x0, x1, y0, y1,
-                               t_max);
+                               0, t_max);
         },
         nb::arg("origin"), nb::arg("base"), nb::arg("dx"), nb::arg("dy"), nb::arg("x0"),
         nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"));
@@ -190,7 +194,7 @@ void bind_beam(nb::module_ &s) {
             Beam beam;
             if (!tile_beam(
                     {{vec(origin), vec(base), vec(dx), vec(dy)}, x, y, size, samples},
-                    first, count, t_max, beam))
+                    first, count, 0, t_max, beam))
                 return std::nullopt;
             return beam;
         },
@@ -198,6 +202,12 @@ void bind_beam(nb::module_ &s) {
         nb::arg("first"), nb::arg("count"), nb::arg("t_max"),
         "Beam of a run of rays of the tile (x, y, size, samples), None if it is no "
         "rectangle.");
+    s.def(
+        "covered_until",
+        [](const Beam &beam, const std::array<Point, 3> &triangle) {
+            return covered_until(beam, triangle_of(triangle));
+        },
+        "Bound of t if the triangle is certain to stop all rays of the beam, else None.");
     s.def("cull_children",
           [](const Beam &beam, const Point &lo, const Point &hi, int axis, float position) {
               const InverseFrustum frustum(beam);

@@ -37,6 +37,8 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
         "search_order",
         {{"paper", SearchOrder::paper}, {"shallow_first", SearchOrder::shallow_first}},
         options.search_order);
+    options.covering_triangles =
+        fields.boolean("covering_triangles", options.covering_triangles);
     fields.finish();
     if (options.initial_tile == 0 || options.minimum_tile == 0)
         refuse_value(
@@ -66,6 +68,9 @@ inline nanobind::dict counters_to_dict(const Counters &counters,
     add("exact_distances", counters.exact_distances);
     add("tiles", counters.tiles);
     add("missed_tiles", counters.missed_tiles);
+    add("splits", counters.splits);
+    add("fallbacks", counters.fallbacks);
+    add("blockers", counters.blockers);
     return dict;
 }
 

@@ -5,6 +5,7 @@
 #include "mlrta/entry_point.h"
 #include "mlrta/frustum_planes.h"
 #include "mlrta/inverse_frustum.h"
+#include "mlrta/occluder.h"
 #include "mlrta/trace.h"
 
 namespace mlrt {
@@ -13,12 +14,18 @@ class BeamJudge {
 public:
     using Cell = BoxPacket; // see InverseFrustum
 
-    BeamJudge(const Beam &beam, const TraceOptions &options, Counters &counters)
-        : beam_(beam), frustum_(beam), culling_(options.culling),
-          leaf_rejection_(options.leaf_rejection), counters_(counters) {}
+    BeamJudge(const KdTree &tree, const Beam &beam, const TraceOptions &options,
+              Counters &counters)
+        : tree_(tree), beam_(beam), frustum_(beam), culling_(options.culling),
+          leaf_rejection_(options.leaf_rejection),
+          covering_triangles_(options.covering_triangles && beam.has_corners),
+          counters_(counters), t_max_(beam.t_max) {}
+
+    // No ray has a first hit beyond this, the beam's own end included.
+    double t_max() const { return t_max_; }
 
     bool knows(const Box3f &box) const {
-        return InverseFrustum::within_range(frustum_.inside(box));
+        return frustum_.says_something(frustum_.inside(box));
     }
     Cell start(const Box3f &box) const { return frustum_.inside(box); }
 
@@ -55,12 +62,39 @@ public:
         return true;
     }
 
+    bool found_blocker() const { return t_max_ < beam_.t_max; }
+    bool reaches(const Cell &cell) const {
+        return !found_blocker() || !frustum_.out_of_reach(cell);
+    }
+
+    // O1 and O3: looks for triangles that cover the beam, and lets it end there. The leaf
+    // may reference more of the triangle than lies in its cell, since the whole beam ends
+    // there anyway.
+    void found(uint32_t, KdNode leaf) {
+        if (!covering_triangles_ || leaf.is_unbuilt() ||
+            leaf.reference_count() > MOST_COVER_TESTS)
+            return;
+        for (const uint32_t primitive : tree_.references_of(leaf))
+            if (const auto t = covered_until(beam_, tree_.triangles[primitive]);
+                t && *t < t_max_) {
+                ++counters_.blockers;
+                t_max_ = *t;
+                frustum_.shorten(t_max_);
+            }
+    }
+
 private:
+    // In leaves with more triangles single ones are too small.
+    static constexpr uint32_t MOST_COVER_TESTS = 16;
+
+    const KdTree &tree_;
     const Beam &beam_;
     InverseFrustum frustum_;
     Culling culling_;
     LeafRejection leaf_rejection_;
+    bool covering_triangles_;
     Counters &counters_;
+    double t_max_;
 };
 
 } // namespace mlrt

@@ -22,6 +22,9 @@ namespace mlrt {
 //   Cell  child(cell, node, upper)    the cell of a child
 //   bool  possible(index, leaf, cell) whether a non-empty leaf may be hit
 //   void  visit(index)                called for each node that is looked at, in order
+//   void  found(index, leaf)          called for each possible leaf that is found
+//   bool  found_blocker()             whether one of them was seen to end the beam
+//   bool  reaches(cell)               whether the beam may still get as far as that
 
 namespace entry_point_detail {
 
@@ -82,6 +85,7 @@ bool find_leaf(std::span<const KdNode> nodes, Place<Cell> &place, Judge &judge,
                 continue;
             }
         } else if (node.reference_count() > 0 && judge.possible(index, node, cell)) {
+            judge.found(index, node);
             place = {index, depth, cell};
             return true;
         }
@@ -140,12 +144,14 @@ std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Ent
     if (!find_leaf(nodes, place, judge, stack, frozen, path))
         return std::nullopt;
     int candidate = place.depth;
+    const bool shallow_first =
+        order == SearchOrder::shallow_first && !judge.found_blocker();
     for (int i = 0; i < frozen; ++i) {
-        const bool shallow_first = order == SearchOrder::shallow_first;
         Place<Cell> other = stack[size_t(shallow_first ? i : frozen - 1 - i)].other;
         const int depth = other.depth - 1;
         int pending = 0;
-        if (find_leaf(nodes, other, judge, side_stack, pending, side_path)) {
+        if (judge.reaches(other.cell) &&
+            find_leaf(nodes, other, judge, side_stack, pending, side_path)) {
             candidate = depth;
             if (shallow_first)
                 break;

@@ -45,7 +45,7 @@ struct Sides {
 // because rounding is monotone. And p - 5u |p| > i (1 + e) implies p > i: for i >= 0
 // because then p (1 - 5u) > i (1 - u), for p < 0 because then |p| (1 + 5u) < |i| (1 + u),
 // and else i < 0 <= p. Distances along the heading have bounds with the same margin.
-// Nothing overflows if the cell is within_range().
+// Nothing overflows in the cells of which the beam says_something().
 class InverseFrustum {
 public:
     explicit InverseFrustum(const Beam &beam);
@@ -62,9 +62,11 @@ public:
         return load<BoxPacket>(faces.data());
     }
 
-    // Whether distances to all planes across the cell are finite, with a margin.
-    static bool within_range(const BoxPacket &inside) {
-        return drjit::all(absolute(inside) < BoxPacket(0x1p126f));
+    // Whether the beam can exclude anything in a cell: it has a heading along an axis, and
+    // distances to all planes across the cell are finite, with a margin.
+    bool says_something(const BoxPacket &inside) const {
+        return (axes_[0].heading != 0 || axes_[1].heading != 0 || axes_[2].heading != 0) &&
+               drjit::all(absolute(inside) < BoxPacket(0x1p126f));
     }
 
     // Faces of a child of a cell that is split.
@@ -103,6 +105,11 @@ public:
         const LaneBits start_outside = to_bits(inside < BoxPacket(0.0f));
         return {(outside & start_outside) == 0,
                 (outside & ~start_outside) == 0 && !(nearest > axis.reach), upper};
+    }
+
+    // Whether the cell lies behind the beam or beyond its end: what step 2 begins with.
+    bool out_of_reach(const BoxPacket &inside) const {
+        return to_bits(inside < least_inside_) != 0;
     }
 
     // Step 2, at a leaf: whether a ray of the beam may pass through its cell.
@@ -145,12 +152,6 @@ private:
         float reach;                           // no ray goes farther along this axis
         uint32_t entry_face, exit_face;        // lanes
     };
-
-    // What both modes of step 2 begin with: the cell lies behind the beam or beyond its
-    // end.
-    bool out_of_reach(const BoxPacket &inside) const {
-        return to_bits(inside < least_inside_) != 0;
-    }
 
     std::array<Axis, 3> axes_;
     BoxPacket least_inside_; // of cells that may be reached

@@ -72,21 +72,26 @@ public:
             return;
         }
         const uint32_t initial = options_.initial_tile * options_.initial_tile;
+        if (tile_ != nullptr)
+            find_ends();
         for (uint32_t first = 0; first < rays_.count; first += initial)
-            trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_));
+            trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_),
+                       std::numeric_limits<double>::infinity());
     }
 
 private:
     // Searches an entry point for the tile's beam, starting at that of the tile it is part
     // of, and splits the tile unless it is small, or its entry point is a leaf and cannot
-    // get any deeper. A packet is never split.
-    void trace_tile(uint32_t first, uint32_t count, const Entry &parent) {
+    // get any deeper. A packet is never split. No ray has a first hit beyond t_end.
+    void trace_tile(uint32_t first, uint32_t count, const Entry &parent, double t_end) {
         ++counters_.tiles;
         Beam beam;
         if (tile_ == nullptr ||
-            !tile_beam(*tile_, first, count, greatest_t_max(first, count), beam))
+            !tile_beam(*tile_, first, count, greatest_t_min_, greatest_t_max_, beam))
             beam = ray_beam(rays_, first, count);
-        BeamJudge judge(beam, options_, counters_);
+        beam.t_max = std::min(beam.t_max, t_end);
+        BeamJudge judge(tree_, beam, options_, counters_);
+        counters_.fallbacks += !judge.knows(parent.cell);
         const std::optional<Entry> entry =
             search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge,
                                options_.search_order);
@@ -100,12 +105,21 @@ private:
             trace_packets(first, count, *entry);
             return;
         }
-        for_each_child(Tile{first, count}, options_.split_factor,
-                       [&](Tile child) { trace_tile(child.first, child.count, *entry); });
+        ++counters_.splits;
+        for_each_child(Tile{first, count}, options_.split_factor, [&](Tile child) {
+            trace_tile(child.first, child.count, *entry, judge.t_max());
+        });
     }
 
-    double greatest_t_max(uint32_t first, uint32_t count) const {
-        return *std::max_element(rays_.t_max + first, rays_.t_max + first + count);
+    // Of all rays, since those of a camera have the same.
+    void find_ends() {
+        FloatPacket t_min(0.0f), t_max(-std::numeric_limits<float>::infinity());
+        for (uint32_t i = 0; i < rays_.count; i += PACKET_WIDTH) {
+            t_min = maximum(load_padded(rays_.t_min, i, rays_.count), t_min);
+            t_max = maximum(load_padded(rays_.t_max, i, rays_.count), t_max);
+        }
+        greatest_t_min_ = greatest_lane(t_min);
+        greatest_t_max_ = greatest_lane(t_max);
     }
 
     void trace_packets(uint32_t first, uint32_t count, const Entry &entry) {
@@ -190,6 +204,7 @@ private:
     const CameraTile *tile_;
     Output output_;
     Counters &counters_;
+    double greatest_t_min_ = 0, greatest_t_max_ = 0; // of all rays, for camera tiles
 };
 
 template <typename Output>

@@ -44,6 +44,7 @@ struct TraceOptions {
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
     SearchOrder search_order = SearchOrder::shallow_first;
+    bool covering_triangles = true; // beams end at triangles that stop all of their rays
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,

@@ -205,6 +205,7 @@ def test_beams_in_real_trees(core: ModuleType, rejection: str, common_origin: bo
             expected = last_common(list(paths))
             for order in ("paper", "shallow_first"):
                 options: Options = {"leaf_rejection": rejection, "search_order": order}
+                options["covering_triangles"] = False
                 entry = core.mlrta_selftest.entry_point(tree, beam, options)
                 assert entry == expected, (SEED, origins, directions, order)
             deep += entry not in (None, 0)
