@@ -14,6 +14,7 @@ TRACE_OPTIONS = (
     "leaf_rejection",
     "culling",
     "search_order",
+    "frontier",
     "covering_triangles",
 )
 """Fields of ``TraceOptions`` in ``cpp/mlrta/trace.h``."""

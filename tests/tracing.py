@@ -44,9 +44,17 @@ ENTRY_POINTS: dict[str, Options] = {
     "frustum planes": _entry_points(culling="frustum_planes"),
     "no culling": _entry_points(culling="none"),
     "paper's search order": _entry_points(search_order="paper"),
+    "one entry point": _entry_points(frontier=1),
+    "frontier of 16": _entry_points(frontier=16),
     "no covering triangles": _entry_points(covering_triangles=False),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
+    "all of the paper": _entry_points(
+        traversal="interval",
+        leaf_rejection="parameters",
+        search_order="paper",
+        frontier=1,
+    ),
 }
 """Traversals from entry points: MLRTA in its variants."""
 

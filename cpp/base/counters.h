@@ -11,6 +11,7 @@ struct Counters {
     uint64_t entry_steps = 0;     // nodes visited by entry point searches, leaves included
     uint64_t traversal_steps = 0; // nodes visited by packets, leaves included
     uint64_t leaf_visits = 0;     // of which leaves
+    uint64_t frontier_tests = 0;  // packets clipped to further cells of a frontier
     uint64_t triangle_tests = 0;  // packet against triangle
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
@@ -27,6 +28,7 @@ struct Counters {
         entry_steps += other.entry_steps;
         traversal_steps += other.traversal_steps;
         leaf_visits += other.leaf_visits;
+        frontier_tests += other.frontier_tests;
         triangle_tests += other.triangle_tests;
         double_tests += other.double_tests;
         exact_tests += other.exact_tests;

@@ -4,7 +4,7 @@
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "geometry/triangle_test.h"
-#include "mlrta/beam_judge.h"
+#include "mlrta/frontier.h"
 #include "mlrta/tile.h"
 
 #include <map>
@@ -117,6 +117,26 @@ std::optional<uint32_t> entry_point(const TreeHandle &handle, const Beam &beam,
     return entry ? std::optional(entry->node) : std::nullopt;
 }
 
+// (node, lower corner, upper corner, earliest hit) of the entries.
+std::vector<std::tuple<uint32_t, Point, Point, float>>
+frontier_of(const TreeHandle &handle, const Beam &beam, uint32_t capacity,
+            const nb::dict &options) {
+    const TraceOptions trace_options = trace_options_from(options);
+    Counters counters;
+    BeamJudge judge(*handle.tree, beam, trace_options, counters);
+    const Frontier frontier =
+        search_frontier(handle.tree->nodes, Frontier(root_entry(*handle.tree)), capacity,
+                        judge, trace_options.search_order);
+    std::vector<std::tuple<uint32_t, Point, Point, float>> entries;
+    for (uint32_t i = 0; i < frontier.count; ++i) {
+        const auto &[node, cell] = frontier.entries[i];
+        entries.emplace_back(node, Point{cell.lo.x, cell.lo.y, cell.lo.z},
+                             Point{cell.hi.x, cell.hi.y, cell.hi.z},
+                             frontier.earliest_hit[i]);
+    }
+    return entries;
+}
+
 // Searches an entry point for each beam, `rounds` times over.
 Counters search_all(const TreeHandle &handle, const std::vector<Beam> &beams,
                     const nb::dict &options, uint32_t rounds) {
@@ -179,12 +199,13 @@ void bind_beam(nb::module_ &s) {
     s.def(
         "camera_beam",
         [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
-           double x0, double x1, double y0, double y1, double t_max) {
+           double x0, double x1, double y0, double y1, double t_max, double t_min) {
             return camera_beam({vec(origin), vec(base), vec(dx), vec(dy)}, x0, x1, y0, y1,
-                               0, t_max);
+                               t_min, t_max);
         },
         nb::arg("origin"), nb::arg("base"), nb::arg("dx"), nb::arg("dy"), nb::arg("x0"),
-        nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"));
+        nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"),
+        nb::arg("t_min") = 0.0);
     s.def(
         "tile_beam",
         [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
@@ -280,6 +301,9 @@ void bind_mlrta_selftest(nb::module_ &m) {
         "(first, count) of the parts of a tile, in order.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
+    s.def("frontier", &frontier_of, nb::arg("tree"), nb::arg("beam"), nb::arg("capacity"),
+          nb::arg("options") = nb::dict(),
+          "(node, lower corner, upper corner, earliest hit) of each entry.");
     s.def(
         "search_all",
         [](const TreeHandle &tree, const std::vector<Beam> &beams, const nb::dict &options,

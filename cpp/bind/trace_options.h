@@ -3,6 +3,7 @@
 
 #include "base/counters.h"
 #include "bind/fields.h"
+#include "mlrta/frontier.h"
 #include "mlrta/trace.h"
 
 namespace mlrt {
@@ -37,6 +38,7 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
         "search_order",
         {{"paper", SearchOrder::paper}, {"shallow_first", SearchOrder::shallow_first}},
         options.search_order);
+    options.frontier = fields.integer_or("frontier", options.frontier, MAX_FRONTIER);
     options.covering_triangles =
         fields.boolean("covering_triangles", options.covering_triangles);
     fields.finish();
@@ -45,6 +47,8 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
             "options['initial_tile'] and options['minimum_tile'] must be positive.");
     if (options.minimum_tile > options.initial_tile)
         refuse_value("options['minimum_tile'] must not exceed options['initial_tile'].");
+    if (options.frontier == 0)
+        refuse_value("options['frontier'] must be positive.");
     if (options.split_factor != 4 && options.split_factor != 16)
         refuse_value("options['split_factor'] must be 4 or 16.");
     return options;
@@ -62,6 +66,7 @@ inline nanobind::dict counters_to_dict(const Counters &counters,
     add("entry_steps", counters.entry_steps);
     add("traversal_steps", counters.traversal_steps);
     add("leaf_visits", counters.leaf_visits);
+    add("frontier_tests", counters.frontier_tests);
     add("triangle_tests", counters.triangle_tests);
     add("double_tests", counters.double_tests);
     add("exact_tests", counters.exact_tests);

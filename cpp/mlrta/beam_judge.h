@@ -67,6 +67,12 @@ public:
         return !found_blocker() || !frustum_.out_of_reach(cell);
     }
 
+    // No ray has a hit in a cell of which the judge knows() before this parameter, as
+    // reported, rounded to float.
+    float earliest_hit(const Box3f &box) const {
+        return frustum_.earliest_entry(frustum_.inside(box));
+    }
+
     // O1 and O3: looks for triangles that cover the beam, and lets it end there. The leaf
     // may reference more of the triangle than lies in its cell, since the whole beam ends
     // there anyway.

@@ -141,7 +141,7 @@ std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Ent
     NodePath path, side_path;
     int frozen = 0;
     Place<Cell> place{start.node, 0, judge.start(start.cell)};
-    if (!find_leaf(nodes, place, judge, stack, frozen, path))
+    if (!judge.reaches(place.cell) || !find_leaf(nodes, place, judge, stack, frozen, path))
         return std::nullopt;
     int candidate = place.depth;
     const bool shallow_first =

@@ -73,6 +73,17 @@ void InverseFrustum::shorten(double t_max) {
     least_inside_ = load<BoxPacket>(least.data());
 }
 
+float InverseFrustum::earliest_entry(const BoxPacket &inside) const {
+    alignas(32) std::array<float, 8> face;
+    store(face.data(), inside);
+    double earliest = 0;
+    for (size_t k = 0; k < 3; ++k)
+        if (axes_[k].heading != 0)
+            earliest =
+                std::max(earliest, -face[axes_[k].entry_face] * least_reciprocal_[k]);
+    return std::max(lowered(earliest), 0.0f);
+}
+
 bool InverseFrustum::may_enter_by_parameters(const BoxPacket &inside) const {
     if (out_of_reach(inside))
         return false;

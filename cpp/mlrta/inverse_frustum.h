@@ -112,6 +112,9 @@ public:
         return to_bits(inside < least_inside_) != 0;
     }
 
+    // No ray meets the cell before this parameter.
+    float earliest_entry(const BoxPacket &inside) const;
+
     // Step 2, at a leaf: whether a ray of the beam may pass through its cell.
 
     // Mode P (the paper): compares, for each pair of axes, when the beam as a whole has

@@ -1,6 +1,6 @@
 #include "mlrta/trace.h"
 
-#include "mlrta/beam_judge.h"
+#include "mlrta/frontier.h"
 #include "mlrta/tile.h"
 #include "traverse/brute_force.h"
 #include "traverse/interval.h"
@@ -67,23 +67,24 @@ public:
 
     void trace() {
         output_.clear(rays_.count);
+        const Frontier root(root_entry(tree_));
         if (options_.traversal == Traversal::brute_force || !options_.entry_points) {
-            trace_packets(0, rays_.count, root_entry(tree_));
+            trace_packets(0, rays_.count, root);
             return;
         }
         const uint32_t initial = options_.initial_tile * options_.initial_tile;
         if (tile_ != nullptr)
             find_ends();
         for (uint32_t first = 0; first < rays_.count; first += initial)
-            trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_),
+            trace_tile(first, std::min(initial, rays_.count - first), root,
                        std::numeric_limits<double>::infinity());
     }
 
 private:
-    // Searches an entry point for the tile's beam, starting at that of the tile it is part
+    // Searches entry points for the tile's beam, starting at those of the tile it is part
     // of, and splits the tile unless it is small, or its entry point is a leaf and cannot
     // get any deeper. A packet is never split. No ray has a first hit beyond t_end.
-    void trace_tile(uint32_t first, uint32_t count, const Entry &parent, double t_end) {
+    void trace_tile(uint32_t first, uint32_t count, const Frontier &parent, double t_end) {
         ++counters_.tiles;
         Beam beam;
         if (tile_ == nullptr ||
@@ -91,23 +92,24 @@ private:
             beam = ray_beam(rays_, first, count);
         beam.t_max = std::min(beam.t_max, t_end);
         BeamJudge judge(tree_, beam, options_, counters_);
-        counters_.fallbacks += !judge.knows(parent.cell);
-        const std::optional<Entry> entry =
-            search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge,
-                               options_.search_order);
-        if (!entry) {
+        counters_.fallbacks += !judge.knows(parent.entries[0].cell);
+        const Frontier frontier =
+            search_frontier({tree_.nodes.data(), tree_.nodes.capacity()}, parent,
+                            options_.frontier, judge, options_.search_order);
+        if (frontier.count == 0) {
             ++counters_.missed_tiles;
             return;
         }
         const uint32_t minimum =
             std::max(options_.minimum_tile * options_.minimum_tile, PACKET_WIDTH);
-        if (count <= minimum || tree_.node(entry->node).is_leaf()) {
-            trace_packets(first, count, *entry);
+        if (count <= minimum ||
+            (frontier.count == 1 && tree_.node(frontier.entries[0].node).is_leaf())) {
+            trace_packets(first, count, frontier);
             return;
         }
         ++counters_.splits;
         for_each_child(Tile{first, count}, options_.split_factor, [&](Tile child) {
-            trace_tile(child.first, child.count, *entry, judge.t_max());
+            trace_tile(child.first, child.count, frontier, judge.t_max());
         });
     }
 
@@ -122,7 +124,7 @@ private:
         greatest_t_max_ = greatest_lane(t_max);
     }
 
-    void trace_packets(uint32_t first, uint32_t count, const Entry &entry) {
+    void trace_packets(uint32_t first, uint32_t count, const Frontier &frontier) {
         for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
             auto [packet, extreme] = load_packet<Origin>(rays_, i);
             const LaneBits in_range = first + count - i >= PACKET_WIDTH
@@ -137,14 +139,27 @@ private:
             counters_.rays += uint64_t(std::popcount(packet.active | extreme));
             counters_.packets += (packet.active | extreme) != 0;
             if (packet.active != 0)
-                trace_one_packet(packet, i, entry);
-            for_each_lane(extreme, [&](uint32_t lane) { trace_one_ray(i + lane, entry); });
+                trace_one_packet(packet, i, frontier);
+            for_each_lane(extreme,
+                          [&](uint32_t lane) { trace_one_ray(i + lane, frontier); });
         }
     }
 
     void trace_one_packet(const RayPacket<Origin> &packet, uint32_t first,
-                          const Entry &entry) {
+                          const Frontier &frontier) {
         PacketState<Output::query> state(packet);
+        trace_from_entry(packet, frontier.entries[0], state);
+        for (uint32_t i = 1; i < frontier.count; ++i) {
+            if (state.search_end() < frontier.earliest_hit[i])
+                continue;
+            ++counters_.frontier_tests;
+            trace_from_entry(packet, frontier.entries[i], state);
+        }
+        output_.set(first, packet.active, state);
+    }
+
+    void trace_from_entry(const RayPacket<Origin> &packet, const Entry &entry,
+                          PacketState<Output::query> &state) {
         switch (options_.traversal) {
         case Traversal::brute_force:
             trace_brute_force(tree_, packet, state, counters_);
@@ -162,7 +177,6 @@ private:
             trace_packet(tree_, packet, entry, state, counters_);
             break;
         }
-        output_.set(first, packet.active, state);
     }
 
     // One interval for rays that go apart would cover most of the tree, so rays without a
@@ -183,7 +197,7 @@ private:
         }
     }
 
-    void trace_one_ray(uint32_t i, const Entry &entry) {
+    void trace_one_ray(uint32_t i, const Frontier &frontier) {
         Ray ray;
         ray.origin = rays_.common_origin;
         for (int k = 0; k < 3; ++k) {
@@ -193,9 +207,22 @@ private:
         }
         ray.t_min = std::max(rays_.t_min[i], 0.0f);
         ray.t_max = rays_.t_max[i];
-        output_.set(i, options_.traversal == Traversal::brute_force
-                           ? brute_force(tree_, ray, Output::query, counters_)
-                           : trace_single(tree_, ray, Output::query, entry, counters_));
+        if (options_.traversal == Traversal::brute_force) {
+            output_.set(i, brute_force(tree_, ray, Output::query, counters_));
+            return;
+        }
+        Hit best;
+        for (uint32_t entry = 0; entry < frontier.count; ++entry) {
+            const Hit hit =
+                trace_single(tree_, ray, Output::query, frontier.entries[entry], counters_);
+            if (hit.t < best.t || (hit.t == best.t && hit.primitive < best.primitive)) {
+                best = hit;
+                ray.t_max = hit.t;
+                if (Output::query == Query::any)
+                    break;
+            }
+        }
+        output_.set(i, best);
     }
 
     const KdTree &tree_;

@@ -44,6 +44,7 @@ struct TraceOptions {
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
     SearchOrder search_order = SearchOrder::shallow_first;
+    uint32_t frontier = 8;          // most subtrees that a tile's rays start at, up to 16
     bool covering_triangles = true; // beams end at triangles that stop all of their rays
 };
 
