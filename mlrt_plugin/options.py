@@ -13,6 +13,9 @@ TRACE_OPTIONS = (
     "split_factor",
     "leaf_rejection",
     "culling",
+    "search_order",
+    "frontier",
+    "covering_triangles",
 )
 """Fields of ``TraceOptions`` in ``cpp/mlrta/trace.h``."""
 

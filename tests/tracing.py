@@ -24,7 +24,7 @@ BRUTE_FORCE: Options = {"traversal": "brute_force", "entry_points": False}
 
 TRAVERSALS: dict[str, Options] = {
     name: {"traversal": name, "entry_points": False}
-    for name in ("single", "packet", "interval", "beam_leaf")
+    for name in ("single", "packet", "interval", "beam_leaf", "adaptive")
 }
 """Traversals from the root."""
 
@@ -43,10 +43,21 @@ ENTRY_POINTS: dict[str, Options] = {
     "leaf rejection by parameters": _entry_points(leaf_rejection="parameters"),
     "frustum planes": _entry_points(culling="frustum_planes"),
     "no culling": _entry_points(culling="none"),
+    "paper's search order": _entry_points(search_order="paper"),
+    "one entry point": _entry_points(frontier=1),
+    "frontier of 16": _entry_points(frontier=16),
+    "no covering triangles": _entry_points(covering_triangles=False),
     "single": _entry_points(traversal="single"),
     "interval": _entry_points(traversal="interval"),
+    "adaptive": _entry_points(traversal="adaptive"),
     "beam_leaf": _entry_points(traversal="beam_leaf"),
     "beam_leaf, large tiles": _entry_points(traversal="beam_leaf", minimum_tile=16),
+    "all of the paper": _entry_points(
+        traversal="interval",
+        leaf_rejection="parameters",
+        search_order="paper",
+        frontier=1,
+    ),
 }
 """Traversals from entry points: MLRTA in its variants."""
 

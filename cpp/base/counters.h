@@ -11,16 +11,20 @@ struct Counters {
     uint64_t entry_steps = 0;     // nodes visited by entry point searches, leaves included
     uint64_t traversal_steps = 0; // nodes visited by packets, leaves included
     uint64_t leaf_visits = 0;     // of which leaves
+    uint64_t frontier_tests = 0;  // packets clipped to further cells of a frontier
     uint64_t triangle_tests = 0;  // packet against triangle
-    uint64_t beam_steps = 0;        // nodes visited by beams that go on to leaves
+    uint64_t beams = 0;             // that went on to leaves
+    uint64_t beam_steps = 0;        // nodes visited by them, leaves included
     uint64_t beam_blocks = 0;       // up to eight triangles against a beam
     uint64_t beam_triangles = 0;    // triangles that a beam may hit
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
     uint64_t exact_tests = 0;     // ... and that double precision left undecided
     uint64_t tiles = 0;           // tiles for which an entry point was searched
-    uint64_t fallbacks = 0;    // beams that were given up and split
     uint64_t missed_tiles = 0;    // tiles that no leaf can hold a hit for
+    uint64_t splits = 0;          // tiles that were split
+    uint64_t fallbacks = 0;       // beams that say nothing, or were given up for packets
+    uint64_t blockers = 0;        // triangles found to cover a tile's beam
 
     Counters &operator+=(const Counters &other) {
         rays += other.rays;
@@ -28,7 +32,9 @@ struct Counters {
         entry_steps += other.entry_steps;
         traversal_steps += other.traversal_steps;
         leaf_visits += other.leaf_visits;
+        frontier_tests += other.frontier_tests;
         triangle_tests += other.triangle_tests;
+        beams += other.beams;
         beam_steps += other.beam_steps;
         beam_blocks += other.beam_blocks;
         beam_triangles += other.beam_triangles;
@@ -36,8 +42,10 @@ struct Counters {
         exact_tests += other.exact_tests;
         exact_distances += other.exact_distances;
         tiles += other.tiles;
-        fallbacks += other.fallbacks;
         missed_tiles += other.missed_tiles;
+        splits += other.splits;
+        fallbacks += other.fallbacks;
+        blockers += other.blockers;
         return *this;
     }
 };

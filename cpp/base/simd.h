@@ -34,6 +34,10 @@ using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
 using PointPacket = drjit::Packet<float, 4>;
 using PointIndices = drjit::Packet<int32_t, 4>;
 
+// Eight lanes: the faces of a box, lower ones in lanes 0 to 2, upper ones in lanes 4 to 6.
+using BoxPacket = drjit::Packet<float, 8>;
+using BoxLanes = drjit::Packet<int32_t, 8>;
+
 // What comparing two T gives: bool, or one truth value a lane.
 template <typename T>
 using MaskOf = drjit::mask_t<T>;

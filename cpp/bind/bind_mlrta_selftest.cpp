@@ -4,7 +4,7 @@
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "geometry/triangle_test.h"
-#include "mlrta/beam_judge.h"
+#include "mlrta/frontier.h"
 #include "mlrta/tile.h"
 
 #include <map>
@@ -70,18 +70,24 @@ Beam beam_of_rays(const Points &origins, const Points &directions, const Values 
 // The search with every decision of the beam looked up in tables: the tests replay the
 // figures of the literature with it.
 struct TableJudge {
+    struct Cell {};
+
     const std::set<uint32_t> &culled;
     const std::set<uint32_t> &impossible;
     std::vector<uint32_t> visited;
 
+    bool knows(const Box3f &) const { return true; }
+    Cell start(const Box3f &) const { return {}; }
+    Cell child(Cell, KdNode, bool) const { return {}; }
     void visit(uint32_t node) { visited.push_back(node); }
-    Sides sides(uint32_t, KdNode node, const Box3f &) const {
+    Sides sides(uint32_t, KdNode node, Cell) const {
         return {!culled.contains(node.lower_child()),
-                !culled.contains(node.lower_child() + 1)};
+                !culled.contains(node.lower_child() + 1), false};
     }
-    bool possible(uint32_t leaf, KdNode, const Box3f &) const {
-        return !impossible.contains(leaf);
-    }
+    bool possible(uint32_t leaf, KdNode, Cell) const { return !impossible.contains(leaf); }
+    void found(uint32_t, KdNode) const {}
+    bool found_blocker() const { return false; }
+    bool reaches(Cell) const { return true; }
 };
 
 // Children: inner nodes and their lower child; other nodes are leaves, empty or of one
@@ -89,13 +95,15 @@ struct TableJudge {
 std::pair<std::optional<uint32_t>, std::vector<uint32_t>>
 search_table(uint32_t node_count, const std::map<uint32_t, uint32_t> &children,
              const std::set<uint32_t> &empty_leaves, const std::set<uint32_t> &culled,
-             const std::set<uint32_t> &impossible) {
+             const std::set<uint32_t> &impossible, bool shallow_first) {
     std::vector<KdNode> nodes;
     for (uint32_t i = 0; i < node_count; ++i)
         nodes.push_back(children.contains(i) ? KdNode::inner(0, 0.5f, children.at(i))
                                              : KdNode::leaf(0, !empty_leaves.contains(i)));
     TableJudge judge{culled, impossible, {}};
-    const auto entry = search_entry_point(nodes, Entry{0, {{0, 0, 0}, {1, 1, 1}}}, judge);
+    const auto entry =
+        search_entry_point(nodes, Entry{0, {{0, 0, 0}, {1, 1, 1}}}, judge,
+                           shallow_first ? SearchOrder::shallow_first : SearchOrder::paper);
     return {entry ? std::optional(entry->node) : std::nullopt, judge.visited};
 }
 
@@ -103,10 +111,47 @@ std::optional<uint32_t> entry_point(const TreeHandle &handle, const Beam &beam,
                                     const nb::dict &options) {
     const TraceOptions trace_options = trace_options_from(options);
     Counters counters;
-    BeamJudge judge(beam, trace_options, counters);
-    const auto entry =
-        search_entry_point(handle.tree->nodes, root_entry(*handle.tree), judge);
+    BeamJudge judge(*handle.tree, beam, trace_options, counters);
+    const auto entry = search_entry_point(handle.tree->nodes, root_entry(*handle.tree),
+                                          judge, trace_options.search_order);
     return entry ? std::optional(entry->node) : std::nullopt;
+}
+
+// (node, lower corner, upper corner, earliest hit) of the entries.
+std::vector<std::tuple<uint32_t, Point, Point, float>>
+frontier_of(const TreeHandle &handle, const Beam &beam, uint32_t capacity,
+            const nb::dict &options) {
+    const TraceOptions trace_options = trace_options_from(options);
+    Counters counters;
+    BeamJudge judge(*handle.tree, beam, trace_options, counters);
+    const Frontier frontier =
+        search_frontier(handle.tree->nodes, Frontier(root_entry(*handle.tree)), capacity,
+                        judge, trace_options.search_order);
+    std::vector<std::tuple<uint32_t, Point, Point, float>> entries;
+    for (uint32_t i = 0; i < frontier.count; ++i) {
+        const auto &[node, cell] = frontier.entries[i];
+        entries.emplace_back(node, Point{cell.lo.x, cell.lo.y, cell.lo.z},
+                             Point{cell.hi.x, cell.hi.y, cell.hi.z},
+                             frontier.earliest_hit[i]);
+    }
+    return entries;
+}
+
+// Searches an entry point for each beam, `rounds` times over.
+Counters search_all(const TreeHandle &handle, const std::vector<Beam> &beams,
+                    const nb::dict &options, uint32_t rounds) {
+    const TraceOptions trace_options = trace_options_from(options);
+    const Entry root = root_entry(*handle.tree);
+    Counters counters;
+    for (uint32_t round = 0; round < rounds; ++round)
+        for (const Beam &beam : beams) {
+            BeamJudge judge(*handle.tree, beam, trace_options, counters);
+            counters.tiles += 1;
+            counters.missed_tiles += !search_entry_point(handle.tree->nodes, root, judge,
+                                                         trace_options.search_order)
+                                          .has_value();
+        }
+    return counters;
 }
 
 // (axis, split, lower child) of inner nodes and (3, number of references, 0) of leaves.
@@ -120,10 +165,9 @@ std::vector<std::tuple<int, float, uint32_t>> nodes_of(const TreeHandle &handle)
     return result;
 }
 
-const char *name_of(Cull cull) {
-    return cull == Cull::near_only  ? "near_only"
-           : cull == Cull::far_only ? "far_only"
-                                    : "both";
+const char *name_of(const Sides &sides) {
+    return sides.near ? (sides.far ? "both" : "near_only")
+                      : (sides.far ? "far_only" : "neither");
 }
 
 void bind_beam(nb::module_ &s) {
@@ -140,6 +184,7 @@ void bind_beam(nb::module_ &s) {
                      })
         .def("slope", [](const Beam &b, size_t k, size_t j) { return pair(b.slope[k][j]); })
         .def("reciprocal", [](const Beam &b, size_t k) { return pair(b.reciprocal[k]); })
+        .def_ro("t_min", &Beam::t_min)
         .def_ro("t_max", &Beam::t_max)
         .def_ro("has_planes", &Beam::has_planes)
         .def_ro("plane_slack", &Beam::plane_slack)
@@ -154,12 +199,13 @@ void bind_beam(nb::module_ &s) {
     s.def(
         "camera_beam",
         [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
-           double x0, double x1, double y0, double y1, double t_max) {
+           double x0, double x1, double y0, double y1, double t_max, double t_min) {
             return camera_beam({vec(origin), vec(base), vec(dx), vec(dy)}, x0, x1, y0, y1,
-                               t_max);
+                               t_min, t_max);
         },
         nb::arg("origin"), nb::arg("base"), nb::arg("dx"), nb::arg("dy"), nb::arg("x0"),
-        nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"));
+        nb::arg("x1"), nb::arg("y0"), nb::arg("y1"), nb::arg("t_max"),
+        nb::arg("t_min") = 0.0);
     s.def(
         "tile_beam",
         [](const Point &origin, const Point &base, const Point &dx, const Point &dy,
@@ -169,7 +215,7 @@ void bind_beam(nb::module_ &s) {
             Beam beam;
             if (!tile_beam(
                     {{vec(origin), vec(base), vec(dx), vec(dy)}, x, y, size, samples},
-                    first, count, t_max, beam))
+                    first, count, 0, t_max, beam))
                 return std::nullopt;
             return beam;
         },
@@ -177,22 +223,31 @@ void bind_beam(nb::module_ &s) {
         nb::arg("first"), nb::arg("count"), nb::arg("t_max"),
         "Beam of a run of rays of the tile (x, y, size, samples), None if it is no "
         "rectangle.");
-    s.def("cull_children", [](const Beam &beam, const Point &lo, const Point &hi, int axis,
-                              double position) {
-        return name_of(cull_children(beam, box(lo, hi), {axis, position}));
-    });
-    s.def("upper_is_near", [](const Beam &beam, int axis, double position) {
-        return upper_is_near(beam, {axis, position});
+    s.def(
+        "covered_until",
+        [](const Beam &beam, const std::array<Point, 3> &triangle) {
+            return covered_until(beam, triangle_of(triangle));
+        },
+        "Bound of t if the triangle is certain to stop all rays of the beam, else None.");
+    s.def("cull_children",
+          [](const Beam &beam, const Point &lo, const Point &hi, int axis, float position) {
+              const InverseFrustum frustum(beam);
+              return name_of(frustum.sides(frustum.inside(box(lo, hi)), {axis, position}));
+          });
+    s.def("upper_is_near", [](const Beam &beam, int axis, float position) {
+        return InverseFrustum(beam).upper_is_near({axis, position});
     });
     s.def("may_enter_by_parameters",
           [](const Beam &beam, const Point &lo, const Point &hi) {
-              return may_enter_by_parameters(beam, box(lo, hi));
+              const InverseFrustum frustum(beam);
+              return frustum.may_enter_by_parameters(frustum.inside(box(lo, hi)));
           });
     s.def("may_enter_by_slopes", [](const Beam &beam, const Point &lo, const Point &hi) {
-        return may_enter_by_slopes(beam, box(lo, hi));
+        const InverseFrustum frustum(beam);
+        return frustum.may_enter_by_slopes(frustum.inside(box(lo, hi)));
     });
     s.def("may_enter_by_planes", [](const Beam &beam, const Point &lo, const Point &hi) {
-        return may_enter_by_planes(beam, box(lo, hi));
+        return may_enter_by_planes(beam, InverseFrustum(beam).inside(box(lo, hi)));
     });
 }
 
@@ -230,6 +285,7 @@ void bind_mlrta_selftest(nb::module_ &m) {
     bind_beam(s);
     s.def("search_table", &search_table, nb::arg("node_count"), nb::arg("children"),
           nb::arg("empty_leaves"), nb::arg("culled"), nb::arg("impossible"),
+          nb::arg("shallow_first"),
           "Entry node (or None) and the nodes visited, in order, for a tree and decisions "
           "given "
           "as tables; the lower child is the near one.");
@@ -245,6 +301,17 @@ void bind_mlrta_selftest(nb::module_ &m) {
         "(first, count) of the parts of a tile, in order.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
+    s.def("frontier", &frontier_of, nb::arg("tree"), nb::arg("beam"), nb::arg("capacity"),
+          nb::arg("options") = nb::dict(),
+          "(node, lower corner, upper corner, earliest hit) of each entry.");
+    s.def(
+        "search_all",
+        [](const TreeHandle &tree, const std::vector<Beam> &beams, const nb::dict &options,
+           uint32_t rounds) {
+            return counters_to_dict(search_all(tree, beams, options, rounds));
+        },
+        nb::arg("tree"), nb::arg("beams"), nb::arg("options"), nb::arg("rounds") = 1,
+        "Counters of searches of an entry point for each beam, some rounds over.");
     s.def("nodes_of", &nodes_of);
 }
 

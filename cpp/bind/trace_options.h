@@ -3,6 +3,7 @@
 
 #include "base/counters.h"
 #include "bind/fields.h"
+#include "mlrta/frontier.h"
 #include "mlrta/trace.h"
 
 namespace mlrt {
@@ -17,7 +18,8 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                                   {"single", Traversal::single},
                                                   {"packet", Traversal::packet},
                                                   {"interval", Traversal::interval},
-                                                  {"beam_leaf", Traversal::beam_leaf}},
+                                                  {"beam_leaf", Traversal::beam_leaf},
+                                                  {"adaptive", Traversal::adaptive}},
                                                  options.traversal);
     options.entry_points = fields.boolean("entry_points", options.entry_points);
     options.initial_tile = fields.integer_or("initial_tile", options.initial_tile, 1024);
@@ -34,12 +36,21 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                               {"inverse_frustum", Culling::inverse_frustum},
                                               {"frustum_planes", Culling::frustum_planes}},
                                              options.culling);
+    options.search_order = fields.choice<SearchOrder>(
+        "search_order",
+        {{"paper", SearchOrder::paper}, {"shallow_first", SearchOrder::shallow_first}},
+        options.search_order);
+    options.frontier = fields.integer_or("frontier", options.frontier, MAX_FRONTIER);
+    options.covering_triangles =
+        fields.boolean("covering_triangles", options.covering_triangles);
     fields.finish();
     if (options.initial_tile == 0 || options.minimum_tile == 0)
         refuse_value(
             "options['initial_tile'] and options['minimum_tile'] must be positive.");
     if (options.minimum_tile > options.initial_tile)
         refuse_value("options['minimum_tile'] must not exceed options['initial_tile'].");
+    if (options.frontier == 0)
+        refuse_value("options['frontier'] must be positive.");
     if (options.split_factor != 4 && options.split_factor != 16)
         refuse_value("options['split_factor'] must be 4 or 16.");
     return options;
@@ -57,12 +68,20 @@ inline nanobind::dict counters_to_dict(const Counters &counters,
     add("entry_steps", counters.entry_steps);
     add("traversal_steps", counters.traversal_steps);
     add("leaf_visits", counters.leaf_visits);
+    add("frontier_tests", counters.frontier_tests);
     add("triangle_tests", counters.triangle_tests);
+    add("beams", counters.beams);
+    add("beam_steps", counters.beam_steps);
+    add("beam_blocks", counters.beam_blocks);
+    add("beam_triangles", counters.beam_triangles);
     add("double_tests", counters.double_tests);
     add("exact_tests", counters.exact_tests);
     add("exact_distances", counters.exact_distances);
     add("tiles", counters.tiles);
     add("missed_tiles", counters.missed_tiles);
+    add("splits", counters.splits);
+    add("fallbacks", counters.fallbacks);
+    add("blockers", counters.blockers);
     return dict;
 }
 

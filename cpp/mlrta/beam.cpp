@@ -44,6 +44,30 @@ void planes_from_slopes(Beam &beam) {
     }
 }
 
+// For a beam without better ones: of all d / |d_k|, which lie in a rectangle of slopes. The
+// narrowest one is taken.
+void corners_from_slopes(Beam &beam) {
+    double least_area = std::numeric_limits<double>::infinity();
+    for (int k = 0; k < 3; ++k) {
+        if (beam.heading[k] == Heading::mixed)
+            continue;
+        const double sign = beam.heading[k] == Heading::positive ? 1 : -1;
+        const int i = (k + 1) % 3, j = (k + 2) % 3;
+        const Range &a = beam.slope[k][i], &b = beam.slope[k][j];
+        const double area = (a.hi - a.lo) * (b.hi - b.lo);
+        if (!(area < least_area))
+            continue;
+        least_area = area;
+        beam.corner_axis = k;
+        beam.has_corners = true;
+        for (int c = 0; c < 4; ++c) {
+            beam.corners[c][k] = sign;
+            beam.corners[c][i] = sign * (c & 1 ? a.hi : a.lo);
+            beam.corners[c][j] = sign * (c & 2 ? b.hi : b.lo);
+        }
+    }
+}
+
 // Least and greatest of what is added, lane by lane: the second operand of minimum() and
 // maximum() stays where the first is not a number.
 struct PacketRange {
@@ -67,8 +91,9 @@ public:
 
     // Adds up to a packet of rays.
     void add(const RayGroup &rays, uint32_t first, uint32_t count) {
+        const FloatPacket t_min = load_padded(rays.t_min, first, first + count);
         const FloatPacket t_max = load_padded(rays.t_max, first, first + count);
-        auto active = load_padded(rays.t_min, first, first + count) < t_max;
+        auto active = t_min < t_max;
         Vec3<FloatPacket> d;
         for (int k = 0; k < 3; ++k) {
             d[k] = load_padded(rays.direction[k], first, first + count);
@@ -90,9 +115,12 @@ public:
                 origin_[k].add(select(
                     active, load_padded(rays.origin[k], first, first + count), none));
         }
+        t_min_.add(select(active, t_min, none));
         t_max_.add(select(active, t_max, none));
     }
 
+    // A negative t_min counts as zero.
+    double greatest_t_min() const { return std::max(t_min_.of_all_lanes().hi, 0.0); }
     double greatest_t_max() const { return t_max_.of_all_lanes().hi; }
     std::array<Range, 3> extent() const { return of_all_lanes(extent_); }
     std::array<Range, 3> origin() const { return of_all_lanes(origin_); }
@@ -128,7 +156,7 @@ private:
     bool has_common_origin_;
     std::array<PacketRange, 3> extent_, origin_;
     std::array<std::array<PacketRange, 3>, 3> slope_;
-    PacketRange t_max_;
+    PacketRange t_min_, t_max_;
 };
 
 // The same slopes in double precision, for directions of any size.
@@ -152,11 +180,12 @@ std::array<std::array<Range, 3>, 3> exact_slopes(const RayGroup &rays, uint32_t 
 } // namespace
 
 Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, double y1,
-                 double t_max) {
+                 double t_min, double t_max) {
     constexpr double u = 0x1p-24;
     Beam beam;
     for (int k = 0; k < 3; ++k)
         beam.origin[k] = {camera.origin[k], camera.origin[k]};
+    beam.t_min = t_min;
     beam.t_max = t_max;
 
     // In order around the rectangle, as the planes need them.
@@ -172,6 +201,9 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
                             std::max(std::abs(y0), std::abs(y1)) * std::abs(camera.dy[k]);
         delta[k] = 4 * u * size + 0x1p-140;
     }
+    beam.corners = directions;
+    beam.corner_slack = delta;
+    beam.has_corners = true;
 
     std::array<Range, 3> extent;
     for (int k = 0; k < 3; ++k) {
@@ -216,8 +248,8 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
     return beam;
 }
 
-bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_max,
-               Beam &beam) {
+bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_min,
+               double t_max, Beam &beam) {
     MLRT_CHECK(uint64_t(first) + count <= uint64_t(tile.size) * tile.size * tile.samples);
     if (first % tile.samples != 0 || count % tile.samples != 0)
         return false;
@@ -233,7 +265,7 @@ bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_
     const int levels = std::countr_zero(pixels);
     const double x0 = tile.x + x, y0 = tile.y + y;
     beam = camera_beam(tile.camera, x0, x0 + (1u << ((levels + 1) / 2)), y0,
-                       y0 + (1u << (levels / 2)), t_max);
+                       y0 + (1u << (levels / 2)), t_min, t_max);
     return true;
 }
 
@@ -243,6 +275,7 @@ Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count) {
         bounds.add(rays, i, std::min(first + count - i, PACKET_WIDTH));
 
     Beam beam;
+    beam.t_min = bounds.greatest_t_min();
     beam.t_max = bounds.greatest_t_max();
     const std::array<Range, 3> extent = bounds.extent();
     const std::array<std::array<Range, 3>, 3> slope =
@@ -262,6 +295,8 @@ Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count) {
         }
     }
     planes_from_slopes(beam);
+    if (rays.has_common_origin)
+        corners_from_slopes(beam);
     return beam;
 }
 

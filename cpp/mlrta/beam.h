@@ -11,6 +11,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 namespace mlrt {
@@ -28,7 +29,16 @@ struct Beam {
     std::array<std::array<Range, 3>, 3> slope;
     std::array<Range, 3> reciprocal;
 
-    double t_max = 0; // no ray ends later
+    double t_min = std::numeric_limits<double>::infinity(); // no ray begins later
+    double t_max = 0;                                       // no ray ends later
+
+    // For covering tests of beams with a common origin: every direction d, or d / |d_k| if
+    // corner_axis is an axis k, is a weighted mean of the corners but for at most
+    // corner_slack in each component.
+    std::array<Vec3d, 4> corners{};
+    Vec3d corner_slack{};
+    int corner_axis = -1;
+    bool has_corners = false;
 
     // Inward normals n of four planes through a common origin that hold all directions d
     // between them, and how far rounding may carry a direction beyond one: n.d >=
@@ -67,13 +77,15 @@ struct CameraTile {
 // holds for directions shifted by a constant too. A computed direction differs from the
 // exact one by at most delta_j = 4u (|base_j| + |x dx_j| + |y dy_j|), so the quotients of
 // the corners' intervals [d_j - delta_j, d_j + delta_j] bound all of them.
+//
+// All rays must begin at t_min at the latest and end at t_max at the latest.
 Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, double y1,
-                 double t_max);
+                 double t_min, double t_max);
 
 // B1 for a run of the tile's rays that is an aligned square or double square of pixels.
 // Returns whether it is one.
-bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_max,
-               Beam &beam);
+bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_min,
+               double t_max, Beam &beam);
 
 // B2 and B3: the beam of rays as they are. B2 is the case of a common origin, such as a
 // light with the points it may reach. Inactive rays do not count. If there is no active one

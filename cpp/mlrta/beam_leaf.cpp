@@ -44,7 +44,9 @@ struct CrossingDepths {
     float first, last;
 };
 
-static const uint32_t DENSE = getenv("DENSE") ? atoi(getenv("DENSE")) : 64;
+// A beam that has been tested against more triangles than these meets a dense surface;
+// chosen.
+constexpr uint32_t DENSE_TRIANGLES = 64;
 
 template <Query query>
 class BeamLeafTracer {
@@ -194,7 +196,7 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
     };
     uint32_t node_index = entry.node;
     Depths depths{0, INFINITE};
-    if (!clip(depths))
+    if (!clip(depths) || depths.near > far_end_ || least_ == INFINITE)
         return true;
     for (;;) {
         const KdNode node = tree_.node(node_index);
@@ -301,7 +303,7 @@ void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) 
     counters_.beam_triangles += tested;
     triangles_left_ -= std::min(triangles_left_, tested);
     tested_ += tested;
-    if (tested_ > DENSE && !dense_) {
+    if (tested_ > DENSE_TRIANGLES && !dense_) {
         grid_.fill(beam_);
         dense_ = true;
     }
@@ -474,21 +476,32 @@ void BeamLeafTracer<query>::update_least() {
 } // namespace
 
 template <Query query>
-bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
+bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      uint32_t most_triangles, BeamPackets &beam, Counters &counters) {
-    return BeamLeafTracer<query>(tree, rays, most_triangles, beam, counters).trace(entry);
+    BeamLeafTracer<query> tracer(tree, rays, most_triangles, beam, counters);
+    for (uint32_t i = 0; i < frontier.count; ++i)
+        if (!tracer.trace(frontier.entries[i]))
+            return false;
+    return true;
 }
 
+template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
+                                              const Frontier &, uint32_t, BeamPackets &,
+                                              Counters &);
+template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
+                                          const Frontier &, uint32_t, BeamPackets &,
+                                          Counters &);
+
 FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Vec3f origin, Counters &counters) {
+                          const BeamPacket &packet, Counters &counters) {
+    // Fewer lanes than this are faster one by one; chosen.
+    constexpr int FEW = 3;
     const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(packet.primitive);
-    LaneArray<float> distances;
-    distances.fill(INFINITE);
     LaneBits left = packet.found;
     const uint32_t first = primitives[uint32_t(std::countr_zero(left))];
     const LaneBits same = to_bits(packet.primitive == UIntPacket(first)) & left;
     FloatPacket t(INFINITE);
-    if (std::popcount(same) > 3) {
+    if (std::popcount(same) > FEW) {
         const Triangle &triangle = tree.triangles[first];
         const TrianglePlane plane(triangle);
         Vec3<DoublePacket> direction;
@@ -497,27 +510,22 @@ FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
                 load_padded(rays.direction[k], packet.first_ray, rays.count));
         const DoublePacket max_direction = maximum(
             absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
+        const Vec3d to_vertex = Vec3d(triangle.a) - Vec3d(rays.common_origin);
         const PlaneDistance<DoublePacket> distance(
-            plane, PlaneNumerator<double>(plane, Vec3d(triangle.a) - Vec3d(origin)), direction,
-            max_direction);
+            plane, PlaneNumerator<double>(plane, to_vertex), direction, max_direction);
         t = distance.template rounded<FloatPacket>();
         left &= ~(same & to_bits(distance.template certain<FloatPacket>()));
         if (left == 0)
             return t;
     }
-    distances = to_lanes<float>(t);
+    LaneArray<float> distances = to_lanes<float>(t);
     for_each_lane(left, [&](uint32_t lane) {
-        distances[lane] = hit_distance(origin, direction_of(rays, packet.first_ray + lane),
-                                       tree.triangles[primitives[lane]]);
+        counters.exact_distances += same >> lane & 1;
+        distances[lane] =
+            hit_distance(rays.common_origin, direction_of(rays, packet.first_ray + lane),
+                         tree.triangles[primitives[lane]]);
     });
-    (void) counters;
     return load<FloatPacket>(distances);
 }
-
-template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
-                                              const Entry &, uint32_t, BeamPackets &,
-                                              Counters &);
-template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &, const Entry &,
-                                          uint32_t, BeamPackets &, Counters &);
 
 } // namespace mlrt

@@ -8,22 +8,22 @@
 
 #include "base/counters.h"
 #include "mlrta/beam_packets.h"
-#include "traverse/query.h"
+#include "mlrta/frontier.h"
 
 namespace mlrt {
 
-// Finds for the active rays of a beam what they hit in the subtree: nearest hits by number
-// of triangle, or any. The group is the one that the beam was loaded from.
+// Finds for the active rays of a beam what they hit in the subtrees of a frontier: the
+// nearest triangles, or any. The group is the one that the beam was loaded from.
 //
-// Gives up once it has tested more than `most_triangles` against the beam, and returns
-// false: what has been found till then is true of Query::any, and of no use otherwise.
+// Gives up once more than `most_triangles` were tested against the beam, and returns false:
+// what has been found till then is true of Query::any, and of no use otherwise.
 template <Query query>
-bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Entry &entry,
+bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      uint32_t most_triangles, BeamPackets &beam, Counters &counters);
 
-// Distances of the nearest hits that were found, as a packet of the group has them; other
-// lanes hold any value.
+// Distances of the nearest hits that a packet has found; other lanes hold any value. At
+// least one must have found something.
 FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Vec3f origin, Counters &counters);
+                          const BeamPacket &packet, Counters &counters);
 
 } // namespace mlrt

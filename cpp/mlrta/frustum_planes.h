@@ -3,11 +3,13 @@
 // p-vertex).
 #pragma once
 
+#include "base/simd.h"
 #include "mlrta/beam.h"
 
 namespace mlrt {
 
-// Whether the box may meet the beam; always true for beams without planes.
-bool may_enter_by_planes(const Beam &beam, const Box3f &cell);
+// Whether a box may meet the beam; always true for beams without planes. The box is given
+// as for InverseFrustum: by what it looks like from the common origin.
+bool may_enter_by_planes(const Beam &beam, const BoxPacket &inside);
 
 } // namespace mlrt

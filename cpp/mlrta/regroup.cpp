@@ -1,11 +1,14 @@
 #include "mlrta/regroup.h"
 
 #include <bit>
-#include <cstdlib>
 
 namespace mlrt {
 
 namespace {
+
+// Packets of rays that are in order cover about the occupied part of the rectangle; chosen
+// from 1.5 and 2.
+constexpr float DISORDER = 2;
 
 // Cells along p (axis 0) or q (axis 1) before each ray.
 FloatPacket cell_of(const BeamPackets &beam, const BeamPacket &packet, int axis) {
@@ -75,7 +78,6 @@ std::optional<Occupancy::Cut> Occupancy::best_cut(float share) const {
 }
 
 bool Occupancy::is_disordered(const BeamPackets &beam) const {
-    static const float limit = getenv("DIS") ? atof(getenv("DIS")) : 2;
     const LaneArray<float> half_p = to_lanes<float>(beam.half_p);
     const LaneArray<float> half_q = to_lanes<float>(beam.half_q);
     float area = 0;
@@ -83,7 +85,7 @@ bool Occupancy::is_disordered(const BeamPackets &beam) const {
         if (beam.packets[n].active != 0)
             area += half_p[n] * half_q[n];
     const SlopeRectangle &r = beam.rectangle;
-    return area > limit * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);
+    return area > DISORDER * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);
 }
 
 uint32_t Occupancy::sorted(const BeamPackets &beam,
@@ -108,22 +110,22 @@ uint32_t Occupancy::sorted(const BeamPackets &beam,
     return count;
 }
 
-RayGroup RegroupedRays::group(const RayGroup &like) const {
-    RayGroup group = like;
+void RegroupedRays::add(const RayGroup &rays, uint32_t ray) {
+    for (int k = 0; k < 3; ++k)
+        direction[k][count] = rays.direction[k][ray];
+    t_min[count] = rays.t_min[ray];
+    t_max[count] = rays.t_max[ray];
+    number[count++] = ray;
+}
+
+RayGroup RegroupedRays::group(const RayGroup &from) const {
+    RayGroup group = from;
     group.count = count;
     for (int k = 0; k < 3; ++k)
         group.direction[k] = direction[k].data();
     group.t_min = t_min.data();
     group.t_max = t_max.data();
     return group;
-}
-
-void RegroupedRays::add(const RayGroup &rays, uint32_t ray, uint32_t ray_number) {
-    for (int k = 0; k < 3; ++k)
-        direction[k][count] = rays.direction[k][ray];
-    t_min[count] = rays.t_min[ray];
-    t_max[count] = rays.t_max[ray];
-    number[count++] = ray_number;
 }
 
 } // namespace mlrt

@@ -4,8 +4,9 @@
 
 #include "mlrta/beam_packets.h"
 
+#include <array>
+#include <cstdint>
 #include <optional>
-#include <vector>
 
 namespace mlrt {
 
@@ -31,7 +32,7 @@ public:
         return int(cut.axis == 0 ? cell_[ray] & 7 : cell_[ray] >> 3) >= cut.cell;
     }
 
-    // Whether packets overlap so much that rays had better be sorted by cells.
+    // Whether packets overlap so much that rays had better be sorted.
     bool is_disordered(const BeamPackets &beam) const;
 
     // Numbers of the active rays, from the beam's first on, cell by cell in Morton order.
@@ -50,8 +51,10 @@ struct RegroupedRays {
     std::array<uint32_t, BeamPackets::MAX_RAYS> number;
     uint32_t count = 0;
 
-    RayGroup group(const RayGroup &like) const;
-    void add(const RayGroup &rays, uint32_t ray, uint32_t ray_number);
+    void add(const RayGroup &rays, uint32_t ray);
+
+    // They alone, with the origin of the group that they are from.
+    RayGroup group(const RayGroup &from) const;
 };
 
 } // namespace mlrt

@@ -1,360 +1,112 @@
 #include "mlrta/trace.h"
 
-#include "mlrta/beam_judge.h"
-#include "mlrta/beam_leaf.h"
-#include "mlrta/regroup.h"
+#include "mlrta/beam_tracer.h"
+#include "mlrta/frontier.h"
+#include "mlrta/packet_tracer.h"
 #include "mlrta/tile.h"
-#include "traverse/brute_force.h"
-#include "traverse/interval.h"
-#include "traverse/load_packet.h"
-#include "traverse/packet.h"
-#include "traverse/single.h"
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <limits>
 
 namespace mlrt {
 
 namespace {
 
-// Where the answers of a query go.
-struct ClosestOutput {
-    static constexpr Query query = Query::closest;
-    HitGroup hits;
-
-    // Room for the answers of regrouped rays, and where they belong.
-    struct Buffer {
-        std::array<float, BeamPackets::MAX_RAYS> t;
-        std::array<uint32_t, BeamPackets::MAX_RAYS> primitive;
-
-        ClosestOutput output() { return {{t.data(), primitive.data()}}; }
-    };
-    void scatter(const Buffer &buffer, const RegroupedRays &rays) const {
-        for (uint32_t i = 0; i < rays.count; ++i) {
-            hits.t[rays.number[i]] = buffer.t[i];
-            hits.primitive[rays.number[i]] = buffer.primitive[i];
-        }
-    }
-
-    void clear(uint32_t count) {
-        std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
-        std::fill_n(hits.primitive, count, NO_PRIMITIVE);
-    }
-    void set(uint32_t ray, const Hit &hit) {
-        hits.t[ray] = hit.t;
-        hits.primitive[ray] = hit.primitive;
-    }
-    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
-        alignas(64) std::array<float, PACKET_WIDTH> t;
-        alignas(64) std::array<uint32_t, PACKET_WIDTH> primitive;
-        store(t.data(), state.hits.t);
-        store(primitive.data(), state.hits.primitive);
-        for_each_lane(lanes & state.hits.found, [&](uint32_t lane) {
-            hits.t[first + lane] = t[lane];
-            hits.primitive[first + lane] = primitive[lane];
-        });
-    }
-    void set(uint32_t first, LaneBits lanes, const FloatPacket &t,
-             const UIntPacket &primitive) {
-        if (lanes == ALL_LANES) {
-            store(hits.t + first, t);
-            store(hits.primitive + first, primitive);
-            return;
-        }
-        const LaneArray<float> distances = to_lanes<float>(t);
-        const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitive);
-        for_each_lane(lanes, [&](uint32_t lane) {
-            hits.t[first + lane] = distances[lane];
-            hits.primitive[first + lane] = numbers[lane];
-        });
-    }
-};
-
-struct AnyOutput {
-    static constexpr Query query = Query::any;
-    uint8_t *occluded;
-
-    struct Buffer {
-        std::array<uint8_t, BeamPackets::MAX_RAYS> occluded;
-
-        AnyOutput output() { return {occluded.data()}; }
-    };
-    void scatter(const Buffer &buffer, const RegroupedRays &rays) const {
-        for (uint32_t i = 0; i < rays.count; ++i)
-            occluded[rays.number[i]] = buffer.occluded[i];
-    }
-
-    void clear(uint32_t count) { std::fill_n(occluded, count, uint8_t(0)); }
-    void set(uint32_t ray, const Hit &hit) {
-        occluded[ray] = hit.primitive != NO_PRIMITIVE;
-    }
-    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
-        set(first, lanes & state.hits.found);
-    }
-    void set(uint32_t first, LaneBits lanes) {
-        for_each_lane(lanes, [&](uint32_t lane) { occluded[first + lane] = 1; });
-    }
-};
-
-// Takes one group through one tree.
-template <typename Origin, typename Output>
-class GroupTracer {
+// Cuts a group into tiles, finds entry points for them, and hands runs of rays on.
+//
+// Runs is what traces them: void trace(first, count, frontier).
+template <typename Runs>
+class TileTracer {
 public:
-    GroupTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-                const CameraTile *tile, Output output, Counters &counters)
-        : tree_(tree), rays_(rays), options_(options), tile_(tile), output_(output),
+    TileTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+               const CameraTile *tile, Runs &runs, Counters &counters)
+        : tree_(tree), rays_(rays), options_(options), tile_(tile), runs_(runs),
           counters_(counters) {}
 
     void trace() {
-        output_.clear(rays_.count);
+        const Frontier root(root_entry(tree_));
         if (options_.traversal == Traversal::brute_force || !options_.entry_points) {
-            trace_packets(0, rays_.count, root_entry(tree_));
+            runs_.trace(0, rays_.count, root);
             return;
         }
         const uint32_t initial = options_.initial_tile * options_.initial_tile;
+        if (tile_ != nullptr)
+            find_ends();
         for (uint32_t first = 0; first < rays_.count; first += initial)
-            trace_tile(first, std::min(initial, rays_.count - first), root_entry(tree_));
-    }
-
-    // Traces all rays of the group from an entry point.
-    void trace_from(const Entry &entry) {
-        output_.clear(rays_.count);
-        trace_beam(0, rays_.count, entry);
+            trace_tile(first, std::min(initial, rays_.count - first), root,
+                       std::numeric_limits<double>::infinity());
     }
 
 private:
-    // Searches an entry point for the tile's beam, starting at that of the tile it is part
+    // Searches entry points for the tile's beam, starting at those of the tile it is part
     // of, and splits the tile unless it is small, or its entry point is a leaf and cannot
-    // get any deeper. A packet is never split.
-    void trace_tile(uint32_t first, uint32_t count, const Entry &parent) {
+    // get any deeper. A packet is never split. No ray has a first hit beyond t_end.
+    void trace_tile(uint32_t first, uint32_t count, const Frontier &parent, double t_end) {
         ++counters_.tiles;
         Beam beam;
         if (tile_ == nullptr ||
-            !tile_beam(*tile_, first, count, greatest_t_max(first, count), beam))
+            !tile_beam(*tile_, first, count, greatest_t_min_, greatest_t_max_, beam))
             beam = ray_beam(rays_, first, count);
-        BeamJudge judge(beam, options_, counters_);
-        const std::optional<Entry> entry =
-            search_entry_point({tree_.nodes.data(), tree_.nodes.capacity()}, parent, judge);
-        if (!entry) {
+        beam.t_max = std::min(beam.t_max, t_end);
+        BeamJudge judge(tree_, beam, options_, counters_);
+        counters_.fallbacks += !judge.knows(parent.entries[0].cell);
+        const Frontier frontier =
+            search_frontier({tree_.nodes.data(), tree_.nodes.capacity()}, parent,
+                            options_.frontier, judge, options_.search_order);
+        if (frontier.count == 0) {
             ++counters_.missed_tiles;
             return;
         }
         const uint32_t minimum =
             std::max(options_.minimum_tile * options_.minimum_tile, PACKET_WIDTH);
-        if (count <= minimum || tree_.node(entry->node).is_leaf()) {
-            trace_packets(first, count, *entry);
+        if (count <= minimum ||
+            (frontier.count == 1 && tree_.node(frontier.entries[0].node).is_leaf())) {
+            runs_.trace(first, count, frontier);
             return;
         }
-        for_each_child(Tile{first, count}, options_.split_factor,
-                       [&](Tile child) { trace_tile(child.first, child.count, *entry); });
+        ++counters_.splits;
+        for_each_child(Tile{first, count}, options_.split_factor, [&](Tile child) {
+            trace_tile(child.first, child.count, frontier, judge.t_max());
+        });
     }
 
-    double greatest_t_max(uint32_t first, uint32_t count) const {
-        return *std::max_element(rays_.t_max + first, rays_.t_max + first + count);
-    }
-
-    void trace_packets(uint32_t first, uint32_t count, const Entry &entry) {
-        if constexpr (std::is_same_v<Origin, CommonOrigin>) {
-            if (options_.traversal == Traversal::beam_leaf) {
-                for (uint32_t i = 0; i < count; i += BeamPackets::MAX_RAYS)
-                    trace_beam(first + i, std::min(count - i, BeamPackets::MAX_RAYS), entry);
-                return;
-            }
+    // Of all rays, since those of a camera have the same.
+    void find_ends() {
+        FloatPacket t_min(0.0f), t_max(-std::numeric_limits<float>::infinity());
+        for (uint32_t i = 0; i < rays_.count; i += PACKET_WIDTH) {
+            t_min = maximum(load_padded(rays_.t_min, i, rays_.count), t_min);
+            t_max = maximum(load_padded(rays_.t_max, i, rays_.count), t_max);
         }
-        trace_run(first, count, ALL_LANES, entry);
-    }
-
-    void trace_beam(uint32_t first, uint32_t count, const Entry &entry) {
-        BeamPackets &beam = beam_;
-        beam.load(rays_, first, count, tile_ ? &tile_->camera : nullptr);
-        if (beam.any_active && split_beam(first, count, entry, false))
-            return;
-        counters_.packets += beam.count;
-        counters_.tiles += 1;
-        if (beam.any_active) {
-            static const uint32_t B0 = getenv("B0") ? atoi(getenv("B0")) : 1000000;
-            static const uint32_t B1 = getenv("B1") ? atoi(getenv("B1")) : 1000000;
-            static const uint32_t BN = getenv("BN") ? atoi(getenv("BN")) : 64;
-            const uint32_t most = count > BN ? Output::query == Query::any ? B1 : B0 : ~0u;
-            const uint64_t before = counters_.beam_triangles;
-            const bool complete = trace_beam_leaf<Output::query>(tree_, rays_, entry, most, beam, counters_);
-            *cost_ += 0.5f * (float(counters_.beam_triangles - before) / float(count) - *cost_);
-            if (!complete) {
-                ++counters_.fallbacks;
-                if constexpr (Output::query == Query::any)
-                    for (uint32_t n = 0; n < beam.count; ++n) {
-                        BeamPacket &packet = beam.packets[n];
-                        if (packet.found)
-                            output_.set(packet.first_ray, packet.found);
-                        packet.active &= ~packet.found;
-                    }
-                split_beam(first, count, entry, true);
-                return;
-            }
-            for (uint32_t n = 0; n < beam.count; ++n) {
-                const BeamPacket &packet = beam.packets[n];
-                counters_.rays += uint64_t(std::popcount(packet.active));
-                if (packet.found == 0)
-                    continue;
-                if constexpr (Output::query == Query::closest)
-                    output_.set(packet.first_ray, packet.found,
-                                hit_distances(tree_, rays_, packet, beam.origin, counters_),
-                                packet.primitive);
-                else
-                    output_.set(packet.first_ray, packet.found);
-            }
-        }
-        if (beam.any_stray)
-            for (uint32_t n = 0; n < beam.count; ++n)
-                if (const LaneBits strays = beam.packets[n].strays)
-                    trace_run(beam.packets[n].first_ray, std::min(PACKET_WIDTH, first + count - beam.packets[n].first_ray), strays, entry);
-    }
-
-    // Traces the parts of a beam whose rays leave a gap, or of which some go another way,
-    // as beams of their own. Returns false if there is nothing to split.
-    bool split_beam(uint32_t first, uint32_t count, const Entry &entry, bool force) {
-        RegroupedRays parts[2];
-        parts[0].count = parts[1].count = 0;
-        if (beam_.any_stray) {
-            for (uint32_t n = 0; n < beam_.count; ++n) {
-                const BeamPacket &packet = beam_.packets[n];
-                for_each_lane(packet.active | packet.strays, [&](uint32_t lane) {
-                    const uint32_t ray = packet.first_ray + lane;
-                    parts[packet.strays >> lane & 1].add(rays_, ray, ray);
-                });
-            }
-        } else {
-            if (!force && (tile_ || count <= PACKET_WIDTH))
-                return false;
-            static const float SH0 = getenv("SHARE") ? atof(getenv("SHARE")) : 0.6f;
-            static const float SH1 = getenv("SHARE1") ? atof(getenv("SHARE1")) : 0.9f;
-            static const float COST = getenv("COST") ? atof(getenv("COST")) : 0.25f;
-            const Occupancy occupancy(beam_);
-            const std::optional<Occupancy::Cut> cut = occupancy.best_cut(*cost_ > COST ? SH1 : SH0);
-            if (!force && !cut && (sorted_ || !occupancy.is_disordered(beam_)))
-                return false;
-            std::array<uint8_t, BeamPackets::MAX_RAYS> order;
-            const uint32_t active = occupancy.sorted(beam_, order);
-            for (uint32_t i = 0; i < active; ++i)
-                parts[cut ? occupancy.is_beyond(order[i], *cut) : force && i >= active / 2].add(
-                    rays_, first + order[i], first + order[i]);
-        }
-        for (const RegroupedRays &part : parts) {
-            if (part.count == 0)
-                continue;
-            typename Output::Buffer buffer;
-            const RayGroup group = part.group(rays_);
-            GroupTracer tracer(tree_, group, options_, nullptr, buffer.output(), counters_);
-            tracer.sorted_ = !beam_.any_stray;
-            tracer.cost_ = cost_;
-            tracer.trace_from(entry);
-            output_.scatter(buffer, part);
-        }
-        return true;
-    }
-
-    // Traces the given lanes of each packet.
-    void trace_run(uint32_t first, uint32_t count, LaneBits lanes, const Entry &entry) {
-        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
-            auto [packet, extreme] = load_packet<Origin>(rays_, i);
-            const LaneBits in_range = first + count - i >= PACKET_WIDTH
-                                          ? ALL_LANES
-                                          : (1u << (first + count - i)) - 1;
-            packet.active &= lanes;
-            extreme &= lanes;
-            packet.active &= in_range;
-            extreme &= in_range;
-            if (options_.traversal == Traversal::single) {
-                extreme |= packet.active;
-                packet.active = 0;
-            }
-            counters_.rays += uint64_t(std::popcount(packet.active | extreme));
-            counters_.packets += (packet.active | extreme) != 0;
-            if (packet.active != 0)
-                trace_one_packet(packet, i, entry);
-            for_each_lane(extreme, [&](uint32_t lane) { trace_one_ray(i + lane, entry); });
-        }
-    }
-
-    void trace_one_packet(const RayPacket<Origin> &packet, uint32_t first,
-                          const Entry &entry) {
-        PacketState<Output::query> state(packet);
-        switch (options_.traversal) {
-        case Traversal::brute_force:
-            trace_brute_force(tree_, packet, state, counters_);
-            break;
-        case Traversal::interval:
-            if constexpr (std::is_same_v<Origin, CommonOrigin>)
-                trace_interval(tree_, packet, packet.active, entry, state, counters_);
-            else
-                for_each_octant(packet, [&](LaneBits lanes) {
-                    trace_interval(tree_, packet, lanes, entry, state, counters_);
-                });
-            break;
-        case Traversal::packet:
-        case Traversal::single:
-        case Traversal::beam_leaf:
-            trace_packet(tree_, packet, entry, state, counters_);
-            break;
-        }
-        output_.set(first, packet.active, state);
-    }
-
-    // One interval for rays that go apart would cover most of the tree, so rays without a
-    // common origin are traced by octants of their directions: calls trace(lanes) for the
-    // lanes of each.
-    template <typename Trace>
-    static void for_each_octant(const RayPacket<Origin> &packet, Trace &&trace) {
-        std::array<LaneBits, 3> negative;
-        for (int k = 0; k < 3; ++k)
-            negative[k] = to_bits(packet.direction[k] < 0.0f);
-        for (LaneBits left = packet.active; left != 0;) {
-            const int lane = std::countr_zero(left);
-            LaneBits lanes = left;
-            for (int k = 0; k < 3; ++k)
-                lanes &= (negative[k] >> lane & 1) ? negative[k] : ~negative[k];
-            trace(lanes);
-            left &= ~lanes;
-        }
-    }
-
-    void trace_one_ray(uint32_t i, const Entry &entry) {
-        Ray ray;
-        ray.origin = rays_.common_origin;
-        for (int k = 0; k < 3; ++k) {
-            if constexpr (std::is_same_v<Origin, LaneOrigins>)
-                ray.origin[k] = rays_.origin[k][i];
-            ray.direction[k] = rays_.direction[k][i];
-        }
-        ray.t_min = std::max(rays_.t_min[i], 0.0f);
-        ray.t_max = rays_.t_max[i];
-        output_.set(i, options_.traversal == Traversal::brute_force
-                           ? brute_force(tree_, ray, Output::query, counters_)
-                           : trace_single(tree_, ray, Output::query, entry, counters_));
+        greatest_t_min_ = greatest_lane(t_min);
+        greatest_t_max_ = greatest_lane(t_max);
     }
 
     const KdTree &tree_;
     const RayGroup &rays_;
     const TraceOptions &options_;
     const CameraTile *tile_;
-    Output output_;
+    Runs &runs_;
     Counters &counters_;
-    BeamPackets beam_;
-    float own_cost_ = 0, *cost_ = &own_cost_;
-    bool sorted_ = false; // rays are in the order of their slopes
+    double greatest_t_min_ = 0, greatest_t_max_ = 0; // of all rays, for camera tiles
 };
 
 template <typename Output>
 void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
                  const CameraTile *tile, Output output, Counters &counters) {
-    if (rays.has_common_origin)
-        GroupTracer<CommonOrigin, Output>(tree, rays, options, tile, output, counters)
-            .trace();
-    else
-        GroupTracer<LaneOrigins, Output>(tree, rays, options, tile, output, counters)
-            .trace();
+    const auto trace_runs = [&](auto runs) {
+        TileTracer(tree, rays, options, tile, runs, counters).trace();
+    };
+    output.clear(rays.count);
+    if (!rays.has_common_origin) {
+        trace_runs(PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
+    } else if (options.traversal == Traversal::beam_leaf ||
+               options.traversal == Traversal::adaptive) {
+        BeamExperience experience;
+        trace_runs(BeamTracer<Output>(tree, rays, options, tile ? &tile->camera : nullptr,
+                                      output, counters, experience));
+    } else {
+        trace_runs(PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));
+    }
 }
 
 } // namespace

@@ -4,6 +4,7 @@
 #include "base/counters.h"
 #include "kdtree/tree.h"
 #include "mlrta/beam.h"
+#include "mlrta/entry_point.h"
 #include "traverse/ray_group.h"
 
 #include <cstdint>
@@ -18,7 +19,8 @@ enum class Traversal : uint32_t {
     packet,      // X2: 16 rays at a time, an interval each
     interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005,
                  // section 3.3)
-    beam_leaf,   // X4: beams of up to 256 rays, as far as rays share an origin; else X2
+    beam_leaf,   // X4: beams of up to 256 rays, if they have a common origin; else X2
+    adaptive,    // X4 as long as it pays, else X2
 };
 
 // Step 2 of inverse frustum culling, at leaves [C2].
@@ -36,13 +38,16 @@ enum class Culling : uint32_t {
 };
 
 struct TraceOptions {
-    Traversal traversal = Traversal::packet;
+    Traversal traversal = Traversal::adaptive;
     bool entry_points = true;    // MLRTA: search an entry point for each tile
     uint32_t initial_tile = 128; // ITS: rays along the side of a tile
     uint32_t minimum_tile = 32;  // MTS: tiles of at most this size are traced
     uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
+    SearchOrder search_order = SearchOrder::shallow_first;
+    uint32_t frontier = 8;          // most subtrees that a tile's rays start at, up to 16
+    bool covering_triangles = true; // beams end at triangles that stop all of their rays
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,

@@ -62,7 +62,10 @@ void trace_interval(const KdTree &tree, const RayPacket<Origin> &rays, LaneBits 
     std::array<Pending, MAX_TREE_DEPTH + 1> stack;
     int pending = 0;
 
-    const ParameterInterval<FloatPacket> clipped = clip_to_cell(rays, entry.cell);
+    ParameterInterval<FloatPacket> clipped = clip_to_cell(rays, entry.cell);
+    // What was found in another subtree ends the interval.
+    if (state.hits.found != 0)
+        clipped.far = minimum(clipped.far, state.hits.t * WIDEN_FAR);
     lanes &= to_bits(clipped.not_empty()) & state.searching;
     if (lanes == 0)
         return;

@@ -60,6 +60,9 @@ void trace_packet(const KdTree &tree, const RayPacket<Origin> &rays, const Entry
     int pending = 0;
     uint32_t node_index = entry.node;
     ParameterInterval<FloatPacket> interval = clip_to_cell(rays, entry.cell);
+    // What was found in another subtree ends the interval.
+    if (state.hits.found != 0)
+        interval.far = minimum(interval.far, state.hits.t * WIDEN_FAR);
     LaneBits lanes = to_bits(interval.not_empty()) & state.searching;
     for (;;) {
         if (lanes == 0) {

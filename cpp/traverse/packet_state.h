@@ -27,6 +27,12 @@ struct PacketState {
     explicit PacketState(const RayPacket<Origin> &rays)
         : hits(rays.t_max), searching(rays.active) {}
 
+    // Greatest t that any lane may still improve on; minus infinity if none may.
+    float search_end() const {
+        return greatest_lane(
+            select(from_bits<FloatPacket>(searching), hits.t, FloatPacket(-INFINITE)));
+    }
+
     // Tests a triangle for the given lanes.
     template <typename Origin>
     void test(const RayPacket<Origin> &rays, LaneBits lanes, const Triangle &triangle,

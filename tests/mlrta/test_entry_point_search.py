@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
 from types import ModuleType
-from typing import Any
 
 import beams
 import numpy as np
 import pytest
 import workloads
 from tracing import Options, build, each_core
+from trees_of_beams import judge, last_common, possible_leaves
 
 SEED = 2005
-LEAF = 3
 
 # The tree of figure 6 of Reshetov et al. 2005: children of inner nodes, near child first.
 # What hangs below nodes that the beam doesn't reach is left out.
@@ -33,7 +32,9 @@ CULLED = {22, 42, 62}
 EMPTY = {43, 53, 81}
 
 
-def search_figure(core: ModuleType, impossible: set[int]) -> tuple[int | None, list[int]]:
+def search_figure(
+    core: ModuleType, impossible: set[int], shallow_first: bool = False
+) -> tuple[int | None, list[int]]:
     """Returns the entry point and the visited nodes, by their labels in the figure."""
     labels = [1]
     children = {}
@@ -46,7 +47,12 @@ def search_figure(core: ModuleType, impossible: set[int]) -> tuple[int | None, l
         return {labels.index(label) for label in some}
 
     entry, visited = core.mlrta_selftest.search_table(
-        len(labels), children, numbers(EMPTY), numbers(CULLED), numbers(impossible)
+        len(labels),
+        children,
+        numbers(EMPTY),
+        numbers(CULLED),
+        numbers(impossible),
+        shallow_first,
     )
     return None if entry is None else labels[entry], [labels[node] for node in visited]
 
@@ -55,6 +61,13 @@ def search_figure(core: ModuleType, impossible: set[int]) -> tuple[int | None, l
 def test_figure_of_the_paper(core: ModuleType) -> None:
     entry, visited = search_figure(core, set())
     assert visited == [1, 21, 31, 41, 51, 61, 52, 63, 32, 43, 44, 53, 54]
+    assert entry == 21
+
+
+@each_core
+def test_shallow_first_visits_fewer_nodes(core: ModuleType) -> None:
+    entry, visited = search_figure(core, set(), shallow_first=True)
+    assert visited == [1, 21, 31, 41, 51, 61, 32, 43, 44, 53, 54]
     assert entry == 21
 
 
@@ -74,19 +87,6 @@ def test_barren_sides_are_no_candidates(core: ModuleType) -> None:
     assert visited[:7] == [1, 21, 31, 41, 51, 61, 52]
     assert entry == 52
     assert search_figure(core, {61, 63, 71, 82, 54})[0] is None
-
-
-Path = tuple[int, ...]
-
-
-def last_common(paths: list[Path]) -> int | None:
-    """Returns the deepest node that all paths from the root lead through."""
-    common = None
-    for nodes in zip(*paths, strict=False):
-        if len(set(nodes)) > 1:
-            break
-        common = nodes[0]
-    return common
 
 
 @each_core
@@ -113,62 +113,17 @@ def test_answer_is_the_lowest_common_ancestor_of_possible_leaves(core: ModuleTyp
                 path.append(parent[path[-1]])
             if not culled.intersection(path[:-1]):
                 paths.append(tuple(reversed(path)))
-        entry, visited = core.mlrta_selftest.search_table(
-            count, children, empty, culled, impossible
-        )
-        assert entry == last_common(paths), (SEED, children, empty, culled, impossible)
+        tables = count, children, empty, culled, impossible
+        entry, visited = core.mlrta_selftest.search_table(*tables, False)
+        assert entry == last_common(paths), (SEED, tables)
         assert len(set(visited)) == len(visited)
+        again, fewer = core.mlrta_selftest.search_table(*tables, True)
+        assert again == entry, (SEED, tables)
+        assert set(fewer) <= set(visited) and len(set(fewer)) == len(fewer)
         misses += entry is None
         inner += entry in children
         leaves += entry is not None and entry not in children
     assert min(misses, inner, leaves) > 100
-
-
-def possible_leaves(
-    nodes: list[tuple[int, float, int]],
-    path: Path,
-    lo: tuple[float, ...],
-    hi: tuple[float, ...],
-    cull: Callable[..., tuple[bool, bool]],
-    possible: Callable[..., bool],
-) -> Iterator[Path]:
-    """Yields the path from the root to each leaf that a beam cannot exclude."""
-    axis, split, child = nodes[path[-1]]
-    if axis == LEAF:
-        if split > 0 and possible(lo, hi):
-            yield path
-        return
-    middle_lo, middle_hi = list(lo), list(hi)
-    middle_lo[axis] = middle_hi[axis] = split
-    enter_lower, enter_upper = cull(lo, hi, axis, split)
-    if enter_lower:
-        yield from possible_leaves(
-            nodes, (*path, child), lo, tuple(middle_hi), cull, possible
-        )
-    if enter_upper:
-        yield from possible_leaves(
-            nodes, (*path, child + 1), tuple(middle_lo), hi, cull, possible
-        )
-
-
-def judge(core: ModuleType, beam: Any, rejection: str) -> tuple[Any, Any]:
-    """Returns step 1 as (enter lower, enter upper), and step 2."""
-    s = core.mlrta_selftest
-
-    def cull(lo: Any, hi: Any, axis: int, split: float) -> tuple[bool, bool]:
-        answer = s.cull_children(beam, lo, hi, axis, split)
-        upper = s.upper_is_near(beam, axis, split)
-        return (
-            answer == "both" or (answer == "near_only") != upper,
-            answer == "both" or (answer == "near_only") == upper,
-        )
-
-    tests = {
-        "slopes": lambda lo, hi: s.may_enter_by_slopes(beam, lo, hi),
-        "parameters": lambda lo, hi: s.may_enter_by_parameters(beam, lo, hi),
-        "none": lambda lo, hi: True,
-    }
-    return cull, tests[rejection]
 
 
 @each_core
@@ -177,17 +132,21 @@ def judge(core: ModuleType, beam: Any, rejection: str) -> tuple[Any, Any]:
 def test_beams_in_real_trees(core: ModuleType, rejection: str, common_origin: bool) -> None:
     rng = np.random.default_rng(SEED)
     deep = 0
-    for scene in (workloads.soup(rng, 100), workloads.stairs(), workloads.sphere(2)):
-        tree = build(core, scene)
+    scenes = workloads.soup(rng, 100), workloads.stairs(), workloads.sphere(2)
+    for scene, builder in itertools.product(scenes, ("exact", "fast")):
+        tree = build(core, scene, builder=builder)
         nodes = core.mlrta_selftest.nodes_of(tree)
-        options: Options = {"leaf_rejection": rejection}
         for _ in range(25):
             origins, directions = beams.bundle(rng, 6, common_origin, spread=0.1)
             ends = np.zeros(6, np.float32), np.full(6, np.inf, np.float32)
             beam = core.mlrta_selftest.ray_beam(origins, directions, *ends, common_origin)
             lo, hi = tree.bounds
             paths = possible_leaves(nodes, (0,), lo, hi, *judge(core, beam, rejection))
-            entry = core.mlrta_selftest.entry_point(tree, beam, options)
-            assert entry == last_common(list(paths)), (SEED, origins, directions)
+            expected = last_common(list(paths))
+            for order in ("paper", "shallow_first"):
+                options: Options = {"leaf_rejection": rejection, "search_order": order}
+                options["covering_triangles"] = False
+                entry = core.mlrta_selftest.entry_point(tree, beam, options)
+                assert entry == expected, (SEED, origins, directions, order)
             deep += entry not in (None, 0)
     assert deep > 5

@@ -1,0 +1,141 @@
+// Takes packets of a group, or single rays, from a frontier to their answers.
+#pragma once
+
+#include "mlrta/frontier.h"
+#include "mlrta/trace.h"
+#include "mlrta/trace_output.h"
+#include "traverse/brute_force.h"
+#include "traverse/interval.h"
+#include "traverse/load_packet.h"
+#include "traverse/packet.h"
+#include "traverse/single.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace mlrt {
+
+template <typename Origin, typename Output>
+class PacketTracer {
+public:
+    PacketTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                 Output output, Counters &counters)
+        : tree_(tree), rays_(rays), options_(options), output_(output),
+          counters_(counters) {}
+
+    // Traces a run of rays.
+    void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
+        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
+            const uint32_t left = first + count - i;
+            trace_lanes(i, left >= PACKET_WIDTH ? ALL_LANES : (1u << left) - 1, frontier);
+        }
+    }
+
+    // Traces those of sixteen rays from `first` on whose bit is set.
+    void trace_lanes(uint32_t first, LaneBits lanes, const Frontier &frontier) {
+        auto [packet, extreme] = load_packet<Origin>(rays_, first);
+        packet.active &= lanes;
+        extreme &= lanes;
+        if (options_.traversal == Traversal::single) {
+            extreme |= packet.active;
+            packet.active = 0;
+        }
+        counters_.rays += uint64_t(std::popcount(packet.active | extreme));
+        counters_.packets += (packet.active | extreme) != 0;
+        if (packet.active != 0)
+            trace_packet(packet, first, frontier);
+        for_each_lane(extreme, [&](uint32_t lane) { trace_ray(first + lane, frontier); });
+    }
+
+private:
+    void trace_packet(const RayPacket<Origin> &packet, uint32_t first,
+                      const Frontier &frontier) {
+        PacketState<Output::query> state(packet);
+        trace_from(packet, frontier.entries[0], state);
+        for (uint32_t i = 1; i < frontier.count; ++i) {
+            if (state.search_end() < frontier.earliest_hit[i])
+                continue;
+            ++counters_.frontier_tests;
+            trace_from(packet, frontier.entries[i], state);
+        }
+        output_.set(first, packet.active, state);
+    }
+
+    void trace_from(const RayPacket<Origin> &packet, const Entry &entry,
+                    PacketState<Output::query> &state) {
+        switch (options_.traversal) {
+        case Traversal::brute_force:
+            trace_brute_force(tree_, packet, state, counters_);
+            break;
+        case Traversal::interval:
+            if constexpr (std::is_same_v<Origin, CommonOrigin>)
+                trace_interval(tree_, packet, packet.active, entry, state, counters_);
+            else
+                for_each_octant(packet, [&](LaneBits lanes) {
+                    trace_interval(tree_, packet, lanes, entry, state, counters_);
+                });
+            break;
+        case Traversal::packet:
+        case Traversal::single:
+        case Traversal::beam_leaf:
+        case Traversal::adaptive:
+            mlrt::trace_packet(tree_, packet, entry, state, counters_);
+            break;
+        }
+    }
+
+    // One interval for rays that go apart would cover most of the tree, so rays without a
+    // common origin are traced by octants of their directions: calls trace(lanes) for the
+    // lanes of each.
+    template <typename Trace>
+    static void for_each_octant(const RayPacket<Origin> &packet, Trace &&trace) {
+        std::array<LaneBits, 3> negative;
+        for (int k = 0; k < 3; ++k)
+            negative[k] = to_bits(packet.direction[k] < 0.0f);
+        for (LaneBits left = packet.active; left != 0;) {
+            const int lane = std::countr_zero(left);
+            LaneBits lanes = left;
+            for (int k = 0; k < 3; ++k)
+                lanes &= (negative[k] >> lane & 1) ? negative[k] : ~negative[k];
+            trace(lanes);
+            left &= ~lanes;
+        }
+    }
+
+    void trace_ray(uint32_t i, const Frontier &frontier) {
+        Ray ray;
+        ray.origin = rays_.common_origin;
+        for (int k = 0; k < 3; ++k) {
+            if constexpr (std::is_same_v<Origin, LaneOrigins>)
+                ray.origin[k] = rays_.origin[k][i];
+            ray.direction[k] = rays_.direction[k][i];
+        }
+        ray.t_min = std::max(rays_.t_min[i], 0.0f);
+        ray.t_max = rays_.t_max[i];
+        if (options_.traversal == Traversal::brute_force) {
+            output_.set(i, brute_force(tree_, ray, Output::query, counters_));
+            return;
+        }
+        Hit best;
+        for (uint32_t entry = 0; entry < frontier.count; ++entry) {
+            const Hit hit =
+                trace_single(tree_, ray, Output::query, frontier.entries[entry], counters_);
+            if (hit.t < best.t || (hit.t == best.t && hit.primitive < best.primitive)) {
+                best = hit;
+                ray.t_max = hit.t;
+                if (Output::query == Query::any)
+                    break;
+            }
+        }
+        output_.set(i, best);
+    }
+
+    const KdTree &tree_;
+    const RayGroup &rays_;
+    const TraceOptions &options_;
+    Output output_;
+    Counters &counters_;
+};
+
+} // namespace mlrt

@@ -1,0 +1,86 @@
+// Where the answers of a query go, by ray of the group.
+#pragma once
+
+#include "mlrta/regroup.h"
+#include "traverse/packet_state.h"
+#include "traverse/single.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <limits>
+
+namespace mlrt {
+
+struct ClosestOutput {
+    static constexpr Query query = Query::closest;
+    HitGroup hits;
+
+    void clear(uint32_t count) {
+        std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
+        std::fill_n(hits.primitive, count, NO_PRIMITIVE);
+    }
+    void set(uint32_t ray, const Hit &hit) {
+        hits.t[ray] = hit.t;
+        hits.primitive[ray] = hit.primitive;
+    }
+    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
+        set(first, lanes & state.hits.found, state.hits.t, state.hits.primitive);
+    }
+    void set(uint32_t first, LaneBits lanes, const FloatPacket &t,
+             const UIntPacket &primitive) {
+        if (lanes == ALL_LANES) {
+            store(hits.t + first, t);
+            store(hits.primitive + first, primitive);
+            return;
+        }
+        const LaneArray<float> distances = to_lanes<float>(t);
+        const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitive);
+        for_each_lane(lanes, [&](uint32_t lane) {
+            hits.t[first + lane] = distances[lane];
+            hits.primitive[first + lane] = numbers[lane];
+        });
+    }
+
+    // Room for the answers of rays that were regrouped.
+    struct Buffer {
+        std::array<float, BeamPackets::MAX_RAYS> t;
+        std::array<uint32_t, BeamPackets::MAX_RAYS> primitive;
+
+        ClosestOutput output() { return {{t.data(), primitive.data()}}; }
+    };
+    void set(const RegroupedRays &rays, const Buffer &buffer) {
+        for (uint32_t i = 0; i < rays.count; ++i) {
+            hits.t[rays.number[i]] = buffer.t[i];
+            hits.primitive[rays.number[i]] = buffer.primitive[i];
+        }
+    }
+};
+
+struct AnyOutput {
+    static constexpr Query query = Query::any;
+    uint8_t *occluded;
+
+    void clear(uint32_t count) { std::fill_n(occluded, count, uint8_t(0)); }
+    void set(uint32_t ray, const Hit &hit) {
+        occluded[ray] = hit.primitive != NO_PRIMITIVE;
+    }
+    void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
+        set(first, lanes & state.hits.found);
+    }
+    void set(uint32_t first, LaneBits lanes) {
+        for_each_lane(lanes, [&](uint32_t lane) { occluded[first + lane] = 1; });
+    }
+
+    struct Buffer {
+        std::array<uint8_t, BeamPackets::MAX_RAYS> occluded;
+
+        AnyOutput output() { return {occluded.data()}; }
+    };
+    void set(const RegroupedRays &rays, const Buffer &buffer) {
+        for (uint32_t i = 0; i < rays.count; ++i)
+            occluded[rays.number[i]] = buffer.occluded[i];
+    }
+};
+
+} // namespace mlrt
