@@ -40,13 +40,13 @@ enum class Culling : uint32_t {
 struct TraceOptions {
     Traversal traversal = Traversal::adaptive;
     bool entry_points = true;    // MLRTA: search an entry point for each tile
-    uint32_t initial_tile = 128; // ITS: rays along the side of a tile
-    uint32_t minimum_tile = 32;  // MTS: tiles of at most this size are traced
+    uint32_t initial_tile = 64;  // ITS: rays along the side of a tile
+    uint32_t minimum_tile = 64;  // MTS: tiles of at most this size are traced
     uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
     SearchOrder search_order = SearchOrder::shallow_first;
-    uint32_t frontier = 8;          // most subtrees that a tile's rays start at, up to 16
+    uint32_t frontier = 1;          // most subtrees that a tile's rays start at, up to 16
     bool covering_triangles = true; // beams end at triangles that stop all of their rays
 };
 
