@@ -43,9 +43,9 @@ struct TraceOptions {
     uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
-    SearchOrder search_order = SearchOrder::shallow_first;
-    uint32_t frontier = 8;          // most subtrees that a tile's rays start at, up to 16
-    bool covering_triangles = true; // beams end at triangles that stop all of their rays
+    SearchOrder search_order = SearchOrder::shallow_first; // [E1, E2]
+    uint32_t frontier = 8; // most subtrees that a tile's rays start at, up to 16 [E3]
+    bool covering_triangles = true; // beams end at triangles that stop all rays [O1, O3]
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,
