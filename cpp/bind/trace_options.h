@@ -43,13 +43,15 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
     options.frontier = fields.integer_or("frontier", options.frontier, MAX_FRONTIER);
     options.covering_triangles =
         fields.boolean("covering_triangles", options.covering_triangles);
+    const bool names_minimum = fields.has("minimum_tile");
+    const bool names_frontier = fields.has("frontier");
     fields.finish();
-    if (options.initial_tile == 0 || options.minimum_tile == 0)
+    if (options.initial_tile == 0 || (names_minimum && options.minimum_tile == 0))
         refuse_value(
             "options['initial_tile'] and options['minimum_tile'] must be positive.");
     if (options.minimum_tile > options.initial_tile)
         refuse_value("options['minimum_tile'] must not exceed options['initial_tile'].");
-    if (options.frontier == 0)
+    if (names_frontier && options.frontier == 0)
         refuse_value("options['frontier'] must be positive.");
     if (options.split_factor != 4 && options.split_factor != 16)
         refuse_value("options['split_factor'] must be 4 or 16.");

@@ -201,6 +201,8 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
                             std::max(std::abs(y0), std::abs(y1)) * std::abs(camera.dy[k]);
         delta[k] = 4 * u * size + 0x1p-140;
     }
+    // Of the 4u in delta, rounding to float takes 3u and a little: there is room for the
+    // rounding of the corners.
     beam.corners = directions;
     beam.corner_slack = delta;
     beam.has_corners = true;

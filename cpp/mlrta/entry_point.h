@@ -130,6 +130,11 @@ enum class SearchOrder : uint32_t {
 // or the leaf itself. In the paper's order each one that does is the new candidate.
 // Bifurcations inside those other sides are of no interest, since they lie below the
 // candidate; they have a stack of their own.
+//
+// What ends the beam may be found in leaves on the way. If it was in the first one, then
+// the paper's order is taken, near to far, so that what is found next is found before what
+// lies behind it. Either order then gives a node above all leaves that a ray may have its
+// first hit in.
 template <typename Judge>
 std::optional<Entry> search_entry_point(std::span<const KdNode> nodes, const Entry &start,
                                         Judge &judge, SearchOrder order) {

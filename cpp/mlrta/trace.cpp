@@ -14,14 +14,17 @@ namespace {
 
 // Cuts a group into tiles, finds entry points for them, and hands runs of rays on.
 //
-// Runs is what traces them: void trace(first, count, frontier).
+// Runs is what traces them: void trace(first, count, frontier), with the tiles and frontier
+// that are usual for it.
 template <typename Runs>
 class TileTracer {
 public:
     TileTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
                const CameraTile *tile, Runs &runs, Counters &counters)
         : tree_(tree), rays_(rays), options_(options), tile_(tile), runs_(runs),
-          counters_(counters) {}
+          counters_(counters),
+          minimum_tile_(options.minimum_tile ? options.minimum_tile : Runs::MINIMUM_TILE),
+          most_entries_(options.frontier ? options.frontier : Runs::FRONTIER) {}
 
     void trace() {
         const Frontier root(root_entry(tree_));
@@ -52,13 +55,13 @@ private:
         counters_.fallbacks += !judge.knows(parent.entries[0].cell);
         const Frontier frontier =
             search_frontier({tree_.nodes.data(), tree_.nodes.capacity()}, parent,
-                            options_.frontier, judge, options_.search_order);
+                            most_entries_, judge, options_.search_order);
         if (frontier.count == 0) {
             ++counters_.missed_tiles;
             return;
         }
         const uint32_t minimum =
-            std::max(options_.minimum_tile * options_.minimum_tile, PACKET_WIDTH);
+            std::max(minimum_tile_ * minimum_tile_, PACKET_WIDTH);
         if (count <= minimum ||
             (frontier.count == 1 && tree_.node(frontier.entries[0].node).is_leaf())) {
             runs_.trace(first, count, frontier);
@@ -87,6 +90,7 @@ private:
     const CameraTile *tile_;
     Runs &runs_;
     Counters &counters_;
+    uint32_t minimum_tile_, most_entries_;
     double greatest_t_min_ = 0, greatest_t_max_ = 0; // of all rays, for camera tiles
 };
 

@@ -37,17 +37,20 @@ enum class Culling : uint32_t {
     frustum_planes,  // the classic test as control [C3], at leaves too: no leaf rejection
 };
 
+// A packet gains more from each node that it need not visit than a beam does, which visits
+// it once for all of its rays: usual are MTS 32 and a frontier of 8 for packets, MTS 64 and
+// one entry point for beams.
 struct TraceOptions {
     Traversal traversal = Traversal::adaptive;
     bool entry_points = true;    // MLRTA: search an entry point for each tile
     uint32_t initial_tile = 64;  // ITS: rays along the side of a tile
-    uint32_t minimum_tile = 64;  // MTS: tiles of at most this size are traced
+    uint32_t minimum_tile = 0;   // MTS: tiles of at most this size are traced; 0: usual
     uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
-    SearchOrder search_order = SearchOrder::shallow_first;
-    uint32_t frontier = 1;          // most subtrees that a tile's rays start at, up to 16
-    bool covering_triangles = true; // beams end at triangles that stop all of their rays
+    SearchOrder search_order = SearchOrder::shallow_first; // [E1, E2]
+    uint32_t frontier = 0; // most subtrees that rays start at, up to 16; 0: usual [E3]
+    bool covering_triangles = true; // beams end at triangles that stop all rays [O1, O3]
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,
