@@ -21,7 +21,12 @@ from mlrt_compare.bench.contenders import contenders_of, embree_device
 from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.native import Native, load_native
 from mlrt_compare.bench.peak import resident_peaks
-from mlrt_compare.bench.scenes import BenchScene, GeneratedScene, chosen_scenes
+from mlrt_compare.bench.scenes import (
+    BenchScene,
+    GeneratedScene,
+    chosen_scenes,
+    usual_scenes,
+)
 from numpy.typing import NDArray
 
 from mlrt_plugin import KdTree
@@ -49,7 +54,7 @@ def native(cache: Path) -> Native:
 
 @pytest.fixture(scope="module")
 def office(cache: Path) -> BenchScene:
-    return chosen_scenes(["office"], repository.ROOT)[0].load(cache)
+    return chosen_scenes(["office"], usual_scenes(repository.ROOT))[0].load(cache)
 
 
 def command(

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from bench_figures import block, run
-from mlrt_compare.bench import build_table
+from mlrt_compare.bench import build_table, table
 from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
 from mlrt_compare.bench.measure import Timing, in_turns
 
@@ -106,11 +106,11 @@ def test_lazy_growth_is_to_pay_in_large_scenes_only() -> None:
     ],
 )
 def test_numbers(value: float | None, text: str) -> None:
-    assert build_table.number(value) == text
+    assert table.number(value) == text
 
 
 def test_columns_stand_below_one_another() -> None:
-    lines = build_table.aligned([("", "a", "long head"), ("name", "12.5", "3")])
+    lines = table.aligned([("", "a", "long head"), ("name", "12.5", "3")])
     assert lines == ["         a  long head", "name  12.5          3"]
 
 
