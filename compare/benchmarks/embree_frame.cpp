@@ -8,13 +8,27 @@ namespace mlrt::bench {
 
 namespace {
 
+// What a thread reuses from tile to tile and from frame to frame.
+template <typename Mode>
+struct Buffers {
+    typename Mode::Primary primary;
+    typename Mode::Shadow shadow;
+    std::vector<FloatPacket> cosine;
+
+    static Buffers &of_thread() {
+        static thread_local Buffers buffers;
+        return buffers;
+    }
+};
+
 // Renders tile by tile in one of Embree's modes.
 template <typename Mode>
 class TileRenderer {
 public:
     TileRenderer(const EmbreeScene &scene, const View &view, bool shadows,
-                 uint32_t block_count)
-        : scene_(scene.handle()), view_(view), shadows_(shadows) {
+                 uint32_t block_count, Buffers<Mode> &buffers)
+        : scene_(scene.handle()), view_(view), shadows_(shadows), primary_(buffers.primary),
+          shadow_(buffers.shadow), cosine_(buffers.cosine) {
         primary_.prepare({block_count, view.camera.origin, view.near_clip});
         if (shadows) {
             shadow_.prepare({block_count, view.light, SHADOW_EPSILON});
@@ -40,9 +54,7 @@ public:
         for (uint32_t i = 0; i < count; ++i) {
             // What is not active is not occluded, and dark.
             const LaneBits clear = shadow_.unoccluded(i);
-            write(tile, i,
-                  select(from_bits<FloatPacket>(clear), cosine_[i], FloatPacket(0.0f)),
-                  clear & primary_.hit(i), output);
+            write(tile, i, in_lanes(clear, cosine_[i]), clear, output);
         }
     }
 
@@ -52,11 +64,10 @@ private:
         const LaneBits hit = primary_.hit(i);
         FloatPacket cosine = 0.0f;
         if (hit != 0) {
-            const auto hit_mask = from_bits<FloatPacket>(hit);
-            const FloatPacket t = select(hit_mask, primary_.t(i), FloatPacket(0.0f));
+            const FloatPacket t = in_lanes(hit, primary_.t(i));
             const Shading shading =
                 shade(view_, primary_.directions(i), t, primary_.normals(i));
-            cosine = select(hit_mask, shading.cosine, FloatPacket(0.0f));
+            cosine = in_lanes(hit, shading.cosine);
             if (shadows_)
                 shadow_.set(i, shading.from_light, hit, 1 - SHADOW_EPSILON);
         } else if (shadows_) {
@@ -78,25 +89,18 @@ private:
     const View &view_;
     bool shadows_;
     RTCIntersectContext context_;
-    // Reused from tile to tile and from frame to frame.
-    static thread_local typename Mode::Primary primary_;
-    static thread_local typename Mode::Shadow shadow_;
-    static thread_local std::vector<FloatPacket> cosine_;
+    typename Mode::Primary &primary_;
+    typename Mode::Shadow &shadow_;
+    std::vector<FloatPacket> &cosine_;
 };
-
-template <typename Mode>
-thread_local typename Mode::Primary TileRenderer<Mode>::primary_;
-template <typename Mode>
-thread_local typename Mode::Shadow TileRenderer<Mode>::shadow_;
-template <typename Mode>
-thread_local std::vector<FloatPacket> TileRenderer<Mode>::cosine_;
 
 template <typename Mode>
 void render_share(const EmbreeScene &scene, const View &view, const FrameSettings &settings,
                   const RayTile &share, const FrameOutput &output) {
     // A packet is traced as soon as it is made.
     const uint32_t side = Mode::IS_STREAM ? settings.tile_side : BLOCK_SIDE;
-    TileRenderer<Mode> renderer(scene, view, settings.shadows, side * side / PACKET_WIDTH);
+    TileRenderer<Mode> renderer(scene, view, settings.shadows, side * side / PACKET_WIDTH,
+                                Buffers<Mode>::of_thread());
     for_each_tile(view, share, side,
                   [&](const RayTile &tile) { renderer.render(tile, output); });
 }

@@ -17,8 +17,9 @@ namespace mlrt::bench {
 inline constexpr float INACTIVE_END = -1;
 
 inline FloatPacket ends(LaneBits active, float t_max) {
-    return select(from_bits<FloatPacket>(active), FloatPacket(t_max),
-                  FloatPacket(INACTIVE_END));
+    return active == ALL_LANES ? FloatPacket(t_max)
+                               : select(from_bits<FloatPacket>(active), FloatPacket(t_max),
+                                        FloatPacket(INACTIVE_END));
 }
 
 // What the rays of a buffer have in common.

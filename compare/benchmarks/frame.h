@@ -116,6 +116,13 @@ inline Vec3<FloatPacket> primary_directions(const View &view, const Block &block
            y * in_all_lanes(camera.dy);
 }
 
+// The value in the given lanes, zero in the others.
+inline FloatPacket in_lanes(LaneBits lanes, const FloatPacket &value) {
+    return lanes == ALL_LANES
+               ? value
+               : select(from_bits<FloatPacket>(lanes), value, FloatPacket(0.0f));
+}
+
 struct Shading {
     Vec3<FloatPacket> from_light; // to the hit: the direction of the shadow ray
     FloatPacket cosine;           // between the normal, to either side, and the light

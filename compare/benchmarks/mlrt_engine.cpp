@@ -38,6 +38,11 @@ struct TileRays {
     }
 };
 
+TileRays &rays_of_thread() {
+    static thread_local TileRays rays;
+    return rays;
+}
+
 // Normals of the triangles that rays hit, of any length, in the given lanes.
 Vec3<FloatPacket> normals(const KdTree &tree, const uint32_t *primitives, LaneBits lanes) {
     // Mostly one triangle covers a packet.
@@ -76,9 +81,7 @@ public:
             const size_t first = size_t(i) * PACKET_WIDTH;
             store_vectors(first, primary_directions(view_, block));
             store(&rays_.t_min[first], FloatPacket(view_.near_clip));
-            store(&rays_.t_max[first],
-                  select(from_bits<FloatPacket>(block.on_film), FloatPacket(view_.far_clip),
-                         FloatPacket(0.0f)));
+            store(&rays_.t_max[first], in_lanes(block.on_film, view_.far_clip));
         }
         const uint32_t grid = view_.grid;
         const CameraTile square{view_.camera, tile.x / grid, tile.y / grid,
@@ -94,8 +97,7 @@ public:
             const LaneBits hit = hits(first);
             FloatPacket cosine = 0.0f;
             if (hit != 0)
-                cosine = select(from_bits<FloatPacket>(hit), shaded(first, hit).cosine,
-                                FloatPacket(0.0f));
+                cosine = in_lanes(hit, shaded(first, hit).cosine);
             write(tile, i, cosine, hit, output);
         }
     }
@@ -109,14 +111,11 @@ public:
                 store(&rays_.t_max[first], FloatPacket(0.0f));
                 continue;
             }
-            const auto hit_mask = from_bits<FloatPacket>(hit);
             const Shading shading = shaded(first, hit);
             store_vectors(first, shading.from_light);
-            store(&rays_.cosine[first],
-                  select(hit_mask, shading.cosine, FloatPacket(0.0f)));
+            store(&rays_.cosine[first], in_lanes(hit, shading.cosine));
             store(&rays_.t_min[first], FloatPacket(SHADOW_EPSILON));
-            store(&rays_.t_max[first],
-                  select(hit_mask, FloatPacket(1 - SHADOW_EPSILON), FloatPacket(0.0f)));
+            store(&rays_.t_max[first], in_lanes(hit, 1 - SHADOW_EPSILON));
         }
         trace_any(tree_, rays_.group(view_.light), options_, rays_.occluded.data(),
                   counters_);
@@ -126,10 +125,9 @@ public:
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
             const size_t first = size_t(i) * PACKET_WIDTH;
             const LaneBits occluded = set_bytes(&rays_.occluded[first]);
-            write(tile, i,
-                  select(from_bits<FloatPacket>(occluded), FloatPacket(0.0f),
-                         load<FloatPacket>(&rays_.cosine[first])),
-                  hits(first) & ~occluded, output);
+            const auto cosine = load<FloatPacket>(&rays_.cosine[first]);
+            write(tile, i, in_lanes(ALL_LANES & ~occluded, cosine), hits(first) & ~occluded,
+                  output);
         }
     }
 
@@ -139,8 +137,7 @@ private:
     }
 
     Shading shaded(size_t first, LaneBits hit) const {
-        const FloatPacket t = select(from_bits<FloatPacket>(hit),
-                                     load<FloatPacket>(&rays_.t[first]), FloatPacket(0.0f));
+        const FloatPacket t = in_lanes(hit, load<FloatPacket>(&rays_.t[first]));
         return shade(view_, load_vectors(first), t,
                      normals(tree_, &rays_.primitive[first], hit));
     }
@@ -178,10 +175,8 @@ private:
     const View &view_;
     const TraceOptions &options_;
     Counters &counters_;
-    static thread_local TileRays rays_;
+    TileRays &rays_ = rays_of_thread();
 };
-
-thread_local TileRays TileRenderer::rays_;
 
 } // namespace
 
