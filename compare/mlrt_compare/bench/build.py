@@ -16,15 +16,13 @@ from mlrt_plugin.threads import thread_count
 from .ats import traversal_steps
 from .contenders import EMBREE, MLRT, WARM_UP_FACES, Contender, contenders_of, embree_device
 from .goals import goals_of
-from .measure import Run, in_turns, timed
+from .measure import ROUNDS_A_REPEAT, Run, in_turns, timed
 from .native import Native
 from .peak import resident_peaks
 from .scenes import BenchScene
 from .status import show_status
 from .table import plural
 
-ROUNDS_A_REPEAT = 3
-"""Runs that others disturb do not count and are repeated, within this limit; chosen."""
 BACKGROUND = 0xFFFFFFFF
 LARGEST_DIFFERENCE = 1e-3
 """Of the brightness of a pixel that two engines agree on."""

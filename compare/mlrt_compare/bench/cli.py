@@ -1,6 +1,6 @@
 """The command mlrt-bench.
 
-Exit codes: 0 done, 2 MLRT disagrees with itself, 4 the benchmark could not be made, 130
+Exit codes: 0 done, 2 images that must agree do not, 4 the benchmark could not be made, 130
 interrupted. With ``MLRT_DEBUG`` set in the environment, errors come with a traceback.
 """
 
@@ -15,11 +15,11 @@ from pathlib import Path
 from .errors import BenchError
 from .options import (
     Parser,
+    add_sample_counts,
     add_shared_options,
     check_folder_of,
     check_json,
     check_threads,
-    sample_counts,
     settings_of_tracing,
     sizes,
 )
@@ -58,7 +58,7 @@ def make_parser() -> Parser:
         prog=PROGRAM,
         description="Benchmarks of MLRT beside Embree 3 of the mitsuba wheel, in one "
         "process and in turns. The native side is compiled when it is first needed.",
-        epilog="Exit codes: 0 done, 2 MLRT disagrees with itself, 4 could not run.",
+        epilog="Exit codes: 0 done, 2 images that must agree do not, 4 could not run.",
     )
     commands = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
     build = commands.add_parser(
@@ -80,13 +80,7 @@ def make_parser() -> Parser:
     )
     rays.set_defaults(run=run_rays)
     add_shared_options(rays, repeats=9)
-    rays.add_argument(
-        "--spp",
-        type=sample_counts,
-        default=(1, 16),
-        metavar="N,M",
-        help="primary rays a pixel, 1 or 16 (1,16)",
-    )
+    add_sample_counts(rays)
     rays.add_argument(
         "--tiles",
         type=sizes,
@@ -101,6 +95,15 @@ def make_parser() -> Parser:
         metavar="KEY=VALUE,...",
         help="how MLRT traces, such as traversal=interval,minimum_tile=16 (as usual)",
     )
+    frames = commands.add_parser(
+        "frames",
+        help="whole frames by MLRT and by Mitsuba's llvm variant",
+        description="Renders the same image with MLRT and with the integrator direct of "
+        "Mitsuba's llvm_ad_rgb, from the loaded scene to the finished film.",
+    )
+    frames.set_defaults(run=run_frames)
+    add_shared_options(frames, repeats=7, scenes="office,conference")
+    add_sample_counts(frames)
     return parser
 
 
@@ -121,3 +124,16 @@ def run_rays(options: argparse.Namespace) -> bool:
     from .rays_command import run
 
     return run(options)
+
+
+def run_frames(options: argparse.Namespace) -> bool:
+    from .. import llvm
+
+    # Dr.Jit takes its libLLVM when it is first imported, which the command does.
+    try:
+        library = llvm.activate()
+    except llvm.LlvmUnavailable as error:
+        raise BenchError(str(error)) from error
+    from .frames_command import run
+
+    return run(options, library)

@@ -18,8 +18,10 @@ class Parser(argparse.ArgumentParser):
         raise BenchError(f"{message} (see {self.prog} --help)")
 
 
-def add_shared_options(command: argparse.ArgumentParser, *, repeats: int) -> None:
-    """Those that every command has. ``repeats``: the usual number."""
+def add_shared_options(
+    command: argparse.ArgumentParser, *, repeats: int, scenes: str = "all usual ones"
+) -> None:
+    """Those that every command has. ``repeats``, ``scenes``: the usual ones."""
     command.add_argument(
         "--json", type=Path, metavar="FILE", help="write all figures there"
     )
@@ -27,7 +29,7 @@ def add_shared_options(command: argparse.ArgumentParser, *, repeats: int) -> Non
         "--scenes",
         type=names,
         metavar="A,B",
-        help="names of usual scenes or XML files (all usual ones)",
+        help=f"names of usual scenes or XML files ({scenes})",
     )
     command.add_argument(
         "--threads",
@@ -61,6 +63,16 @@ def add_shared_options(command: argparse.ArgumentParser, *, repeats: int) -> Non
         type=Path,
         metavar="DIR",
         help="MLRT's source checkout (the current one)",
+    )
+
+
+def add_sample_counts(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--spp",
+        type=sample_counts,
+        default=(1, 16),
+        metavar="N,M",
+        help="samples a pixel, 1 or 16 (1,16)",
     )
 
 

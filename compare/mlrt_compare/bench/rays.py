@@ -13,12 +13,13 @@ import numpy.typing as npt
 from mlrt_plugin.threads import thread_count
 
 from .ats import baselines
-from .build import BACKGROUND, LARGEST_DIFFERENCE, ROUNDS_A_REPEAT
+from .build import BACKGROUND, LARGEST_DIFFERENCE
 from .contenders import QUALITIES, embree_device
-from .measure import Timing, best, in_turns, waiting_seconds
+from .frame_runs import FrameRun, measured_in_turns
+from .measure import Timing, best, waiting_seconds
 from .native import Native
-from .rays_contenders import FrameRun, RayContender, Variant, ray_contenders
-from .rays_goals import speedup
+from .rays_contenders import RayContender, Variant, ray_contenders
+from .rays_goals import ray_speedup
 from .scenes import BenchScene
 from .status import show_status
 from .table import plural
@@ -26,6 +27,9 @@ from .table import plural
 RUN_SECONDS = 0.05
 """Frames of a run follow one another for about that long, so that each contender has its
 data in the caches; chosen."""
+ENOUGH_SECONDS = 6.0
+"""A contender whose frames took longer than that in all is not run again, once it has run
+twice; chosen, for millions of triangles and 16 samples a pixel."""
 TUNING_SECONDS, TUNING_FRAMES = 0.3, 5
 """A variant is tried until it has had either; chosen."""
 
@@ -164,16 +168,9 @@ class RayBenchmark:
     def _measure(
         self, contenders: list[RayContender], view: Any, shadows: bool, threads: int
     ) -> None:
-        repeats = self._settings.repeats
-        for contender in contenders:
-            contender.runs.clear()
-
-        def run(contender: RayContender) -> FrameRun | None:
-            if not contender.needs_run(repeats):
-                return None
+        def run(contender: RayContender, number: int) -> FrameRun:
             show_status(
-                f"{self._scene.name}, {plural(threads)}: {contender.name}, run "
-                f"{len(contender.runs) + 1}"
+                f"{self._scene.name}, {plural(threads)}: {contender.name}, run {number + 1}"
             )
             assert contender.chosen is not None
             expected = min(trial["wall"] for trial in contender.tuning)
@@ -181,9 +178,13 @@ class RayBenchmark:
             timing = self._render(contender.chosen, view, shadows, frames)
             return FrameRun(timing, frames, timing.busy(threads))
 
-        runs = [partial(run, contender) for contender in contenders]
-        for which, result in in_turns(runs, ROUNDS_A_REPEAT * repeats):
-            contenders[which].runs.append(result)
+        runs = measured_in_turns(
+            [partial(run, contender) for contender in contenders],
+            self._settings.repeats,
+            ENOUGH_SECONDS,
+        )
+        for contender, done in zip(contenders, runs, strict=True):
+            contender.runs = done
 
     def _agreement(
         self, contenders: list[RayContender], view: Any, spp: int, shadows: bool
@@ -246,7 +247,7 @@ class RayBenchmark:
                 for contender in contenders
             ],
         }
-        block["speedup"] = speedup(self._scene.name, block).as_dict()
+        block["speedup"] = ray_speedup(self._scene.name, block).as_dict()
         return block
 
 

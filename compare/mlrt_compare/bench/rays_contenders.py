@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 from .contenders import EMBREE, MLRT, QUALITIES
-from .measure import Timing
+from .frame_runs import FrameRun
 
 EMBREE_MODES = {"r16": ("r16",), "NM": ("NM8", "NM16"), "1M": ("1M",)}
 """Ways in which Embree takes many rays, by what the native side calls their variants:
 coherent packets of 16, coherent streams of packets of 8 or 16, incoherent streams."""
-ENOUGH_SECONDS = 6.0
-"""A contender whose frames took longer than that in all is not run again, once it has run
-twice; chosen, for millions of triangles and 16 samples a pixel."""
 Render = Callable[..., Any]
 """Of the view, the image and keywords; returns seconds."""
 
@@ -27,19 +24,6 @@ class Variant:
     tile: int
     """Rays along the side of what is handed over at once."""
     render: Render
-
-
-@dataclass(frozen=True)
-class FrameRun:
-    """Frames in a row; the figures are those of one."""
-
-    frame: Timing
-    frames: int
-    busy: bool
-    """Whether others had a part of the machine meanwhile."""
-
-    def as_dict(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 @dataclass
@@ -58,13 +42,6 @@ class RayContender:
     @property
     def name(self) -> str:
         return f"{self.engine} {self.kind}".strip()
-
-    def needs_run(self, repeats: int) -> bool:
-        """Whether there are fewer than ``repeats`` runs that nobody disturbed."""
-        spent = sum(run.frame.wall * run.frames for run in self.runs)
-        if len(self.runs) >= 2 and spent > ENOUGH_SECONDS:
-            return False
-        return sum(not run.busy for run in self.runs) < repeats
 
 
 def ray_contenders(

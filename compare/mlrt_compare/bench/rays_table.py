@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .measure import best, median
-from .rays_goals import fastest_peer, frame_seconds
+from .rays_goals import fastest_peer
+from .speedup import aims_text, frame_seconds, ratio_lines, ratio_text
 from .table import aligned, machine_lines, number, plural
 
 COLUMNS = (
@@ -57,29 +58,12 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
         f"{scene['name']}, {scene['triangles']} triangles, {plural(block['threads'])}, "
         f"{work(block['spp'], block['shadows'])}",
         *aligned(rows),
-        f"  MLRT is {ratio(block['speedup'])} times as fast as "
-        f"{fastest_peer(block)['name']}{aims(block['speedup'])}",
+        f"  MLRT is {ratio_text(block['speedup'])} times as fast as "
+        f"{fastest_peer(block)['name']}{aims_text(block['speedup'])}",
     ]
     if not block["mlrt_tiles_give_one_image"]:
         lines.append("  MLRT's tiles do NOT give one image: this is a defect")
     return lines
-
-
-def ratio(speedup: dict[str, Any]) -> str:
-    """Best on the clock, median, and best in CPU time."""
-    return f"{speedup['best']:.2f} ({speedup['median']:.2f}, CPU {speedup['cpu']:.2f})"
-
-
-def aims(speedup: dict[str, Any]) -> str:
-    parts = [
-        f"{name} {speedup[key]:g} {speedup[verdict]}"
-        for name, key, verdict in (
-            ("goal", "goal", "verdict"),
-            ("stretch", "stretch", "stretch_verdict"),
-        )
-        if speedup[key] is not None
-    ]
-    return f": {', '.join(parts)}" if parts else ""
 
 
 def step_lines(scene: dict[str, Any]) -> list[str]:
@@ -99,24 +83,8 @@ def step_lines(scene: dict[str, Any]) -> list[str]:
 
 def goal_lines(scenes: list[dict[str, Any]]) -> list[str]:
     """All ratios: a row a scene and number of threads, a column a kind of rays."""
-    kinds = list(
-        dict.fromkeys(
-            (block["spp"], block["shadows"])
-            for scene in scenes
-            for block in scene.get("blocks", ())
-        )
+    return ratio_lines(
+        "MLRT / best Embree: best (median, CPU)",
+        scenes,
+        lambda block: work(block["spp"], block["shadows"]),
     )
-    rows: list[tuple[str, ...]] = []
-    for scene in scenes:
-        by_threads: dict[int, dict[tuple[int, bool], str]] = {}
-        for block in scene.get("blocks", ()):
-            cell = f"{ratio(block['speedup'])}{aims(block['speedup'])}"
-            cells = by_threads.setdefault(block["threads"], {})
-            cells[block["spp"], block["shadows"]] = cell
-        for threads, cells in by_threads.items():
-            name = f"{scene['name']}, {plural(threads)}"
-            rows.append((name, *(cells.get(kind, "-") for kind in kinds)))
-    if not rows:
-        return []
-    head = ("MLRT / best Embree: best (median, CPU)", *(work(*kind) for kind in kinds))
-    return ["", *aligned([head, *rows])]

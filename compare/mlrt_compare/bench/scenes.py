@@ -7,7 +7,8 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,10 +49,13 @@ class SceneFile:
     path: Path
     remedy: str
 
-    def load(self, cache: Path) -> BenchScene:
+    def file(self, cache: Path) -> Path:
         if not self.path.is_file():
             raise BenchError(f"there is no {self.path}: {self.remedy}")
-        return imported(self.name, self.path)
+        return self.path
+
+    def load(self, cache: Path) -> BenchScene:
+        return imported(self.name, self.file(cache))
 
 
 @dataclass(frozen=True)
@@ -71,26 +75,39 @@ class GeneratedScene:
             digest.update(path.read_bytes())
         return digest.hexdigest()[:16]
 
+    def file(self, cache: Path) -> Path:
+        """The scene as XML, which stays in the cache."""
+        folder = cache / "scenes" / f"{self.name}-{self.key()}"
+        if not folder.is_dir():
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with self.generated(folder.parent) as written:
+                written.parent.rename(folder)
+        return folder / f"{self.folder.name}.xml"
+
     def load(self, cache: Path) -> BenchScene:
         stored = cache / "scenes" / f"{self.name}-{self.key()}.npz"
         if not stored.is_file():
             stored.parent.mkdir(parents=True, exist_ok=True)
-            store(stored, self.generated(stored.parent))
+            with self.generated(stored.parent) as written:
+                store(stored, imported(self.name, written))
         return read_stored(stored, self.name)
 
-    def generated(self, folder: Path) -> BenchScene:
+    @contextmanager
+    def generated(self, folder: Path) -> Iterator[Path]:
+        """Writes the scene to a temporary folder in the given one; the XML file."""
         print(f"mlrt-bench: generating {self.name}", file=sys.stderr, flush=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".generated-") as output:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".generated-") as temporary:
+            output = Path(temporary) / "scene"
             command = [
                 *(sys.executable, str(self.folder / "generate.py")),
                 *("--triangles", str(self.triangles), "--seed", str(self.seed)),
-                *("-o", output),
+                *("-o", str(output)),
             ]
             child = subprocess.run(command, capture_output=True, text=True)
             if child.returncode != 0:
                 reason = (child.stderr.strip() or "no message").splitlines()[-1]
                 raise BenchError(f"the scene {self.name} cannot be generated: {reason}")
-            return imported(self.name, Path(output) / f"{self.folder.name}.xml")
+            yield output / f"{self.folder.name}.xml"
 
 
 SceneSource = SceneFile | GeneratedScene

@@ -8,11 +8,17 @@ from .measure import best, median
 
 
 def machine_lines(machine: dict[str, Any]) -> list[str]:
+    facts = (
+        machine["processor"],
+        f"{machine['cores']} cores",
+        machine["isa"],
+        # Of the benchmarks' native side, and of Mitsuba's kernels.
+        machine["compiler"] or machine.get("llvm"),
+    )
     return [
-        f"{machine['processor']}, {machine['cores']} cores, {machine['isa']}, "
-        f"{machine['compiler']}",
-        f"MLRT {machine['mlrt']} at {(machine['commit'] or 'no commit')[:10]}, Embree of "
-        f"Mitsuba {machine['mitsuba']}; load {machine['load'][0]:.1f}",
+        ", ".join(str(fact) for fact in facts if fact is not None),
+        f"MLRT {machine['mlrt']} at {(machine['commit'] or 'no commit')[:10]}, Mitsuba "
+        f"{machine['mitsuba']} with its Embree; load {machine['load'][0]:.1f}",
     ]
 
 
