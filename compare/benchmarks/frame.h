@@ -157,7 +157,8 @@ void write_rays(const View &view, const Block &block, const Packet &packet, Valu
     });
 }
 
-// Adds the brightness of a block's rays to the image. With a grid of 4 a block is a pixel.
+// Writes the brightness of a block's rays, or its mean: with a grid of 4 a block is a
+// pixel, on the film or off it as a whole.
 inline void write_image(const View &view, const Block &block, const FloatPacket &brightness,
                         float *image) {
     if (view.grid == 1)
@@ -172,6 +173,8 @@ inline void write_image(const View &view, const Block &block, const FloatPacket 
 inline void write_block(const View &view, const Block &block, const FloatPacket &brightness,
                         const UIntPacket &primitive, LaneBits lit,
                         const FrameOutput &output) {
+    if (block.on_film == 0)
+        return;
     write_image(view, block, brightness, output.image);
     if (output.primitive)
         write_rays(view, block, primitive, output.primitive);
