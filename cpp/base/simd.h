@@ -117,7 +117,6 @@ inline float greatest_lane(const FloatPacket &a) {
     return drjit::max(a);
 }
 
-// In an order of its own on each processor.
 inline float sum_of_lanes(const FloatPacket &a) {
     return drjit::sum(a);
 }
