@@ -1,87 +1,16 @@
 #include "embree_engine.h"
 
-#include <immintrin.h>
 #include <stdexcept>
 
 namespace mlrt::bench {
 
 namespace {
 
-// Side of the squares of pixels that threads take; chosen, as MLRT's usual tile.
-constexpr uint32_t TILE_SIDE = 128;
-
-// Embree asks to be run with denormal numbers flushed to zero.
-class FlushDenormals {
-public:
-    FlushDenormals() { _mm_setcsr(before_ | 0x8040); }
-    ~FlushDenormals() { _mm_setcsr(before_); }
-    FlushDenormals(const FlushDenormals &) = delete;
-    FlushDenormals &operator=(const FlushDenormals &) = delete;
-
-private:
-    unsigned before_ = _mm_getcsr();
-};
-
 void check(RTCDevice device, const char *what) {
     const RTCError error = rtcGetDeviceError(device);
     if (error != RTC_ERROR_NONE)
         throw std::runtime_error(std::string("Embree failed to ") + what + " (error " +
                                  std::to_string(int(error)) + ")");
-}
-
-LaneArray<int> valid_lanes(LaneBits lanes) {
-    LaneArray<int> valid;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-        valid[lane] = (lanes >> lane & 1) ? -1 : 0;
-    return valid;
-}
-
-void fill(RTCRay16 &rays, Vec3f origin, const Vec3<FloatPacket> &direction, float t_min,
-          float t_max) {
-    store(rays.org_x, FloatPacket(origin.x));
-    store(rays.org_y, FloatPacket(origin.y));
-    store(rays.org_z, FloatPacket(origin.z));
-    store(rays.dir_x, direction.x);
-    store(rays.dir_y, direction.y);
-    store(rays.dir_z, direction.z);
-    store(rays.tnear, FloatPacket(t_min));
-    store(rays.tfar, FloatPacket(t_max));
-    store(rays.time, FloatPacket(0.0f));
-    store(rays.mask, UIntPacket(0xffffffffu));
-    store(rays.flags, UIntPacket(0u));
-}
-
-void render_block(const EmbreeScene &scene, const View &view, const Block &block,
-                  RTCIntersectContext &context, const FrameOutput &output) {
-    RTCRayHit16 primary;
-    const Vec3<FloatPacket> direction = primary_directions(view, block);
-    fill(primary.ray, view.camera.origin, direction, view.near_clip, view.far_clip);
-    store(primary.hit.geomID, UIntPacket(RTC_INVALID_GEOMETRY_ID));
-    store(primary.hit.primID, UIntPacket(NO_PRIMITIVE));
-    rtcIntersect16(valid_lanes(block.on_film).data(), scene.handle(), &context, &primary);
-
-    const LaneBits hit =
-        to_bits(load<UIntPacket>(primary.hit.geomID) != RTC_INVALID_GEOMETRY_ID) &
-        block.on_film;
-    const auto hit_mask = from_bits<FloatPacket>(hit);
-    FloatPacket image = 0.0f;
-    if (hit != 0) {
-        const Vec3<FloatPacket> normal{load<FloatPacket>(primary.hit.Ng_x),
-                                       load<FloatPacket>(primary.hit.Ng_y),
-                                       load<FloatPacket>(primary.hit.Ng_z)};
-        const FloatPacket t =
-            select(hit_mask, load<FloatPacket>(primary.ray.tfar), FloatPacket(0.0f));
-        const Shading shading = shade(view, direction, t, normal);
-        RTCRay16 shadow;
-        fill(shadow, view.light, shading.from_light, SHADOW_EPSILON, 1 - SHADOW_EPSILON);
-        rtcOccluded16(valid_lanes(hit).data(), scene.handle(), &context, &shadow);
-        // Embree marks an occluded ray by an end at minus infinity.
-        const auto visible = hit_mask & (load<FloatPacket>(shadow.tfar) >= 0.0f);
-        image = select(MaskOf<FloatPacket>(visible), shading.cosine, FloatPacket(0.0f));
-    }
-    write_block(view, block, image, output.image);
-    if (output.primitive)
-        write_block(view, block, load<UIntPacket>(primary.hit.primID), output.primitive);
 }
 
 } // namespace
@@ -151,23 +80,6 @@ EmbreeScene::EmbreeScene(EmbreeDevice &device, const Mesh &mesh, RTCBuildQuality
 
 EmbreeScene::~EmbreeScene() {
     rtcReleaseScene(handle_);
-}
-
-Seconds render_frame(const EmbreeScene &scene, const View &view,
-                     const FrameOutput &output) {
-    const Stopwatch watch;
-    for_each_tile(view, TILE_SIDE, [&](const PixelTile &tile) {
-        const FlushDenormals flush;
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-        for (uint32_t i = 0; i < tile.block_count(); ++i) {
-            const Block block = block_of(tile, i, view);
-            if (block.on_film != 0)
-                render_block(scene, view, block, context, output);
-        }
-    });
-    return watch.elapsed();
 }
 
 } // namespace mlrt::bench

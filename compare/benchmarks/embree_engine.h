@@ -1,18 +1,29 @@
-// Embree's side of a benchmark: the library that Mitsuba uses, in packets of sixteen
-// coherent rays.
+// Embree's side of a benchmark: the library that Mitsuba uses.
 #pragma once
 
-#include "frame.h"
 #include "mesh.h"
 #include "stopwatch.h"
 
 #include <atomic>
 #include <embree3/rtcore.h>
+#include <immintrin.h>
 #include <string>
 
 namespace mlrt::bench {
 
 RTC_NAMESPACE_USE
+
+// Embree asks to be run with denormal numbers flushed to zero.
+class FlushDenormals {
+public:
+    FlushDenormals() { _mm_setcsr(before_ | 0x8040); }
+    ~FlushDenormals() { _mm_setcsr(before_); }
+    FlushDenormals(const FlushDenormals &) = delete;
+    FlushDenormals &operator=(const FlushDenormals &) = delete;
+
+private:
+    unsigned before_ = _mm_getcsr();
+};
 
 // All devices of a process share Embree's threads, as many as the one with the most asks
 // for: there should be one at a time.
@@ -58,7 +69,5 @@ private:
     Seconds seconds_;
     int64_t bytes_, peak_bytes_;
 };
-
-Seconds render_frame(const EmbreeScene &scene, const View &view, const FrameOutput &output);
 
 } // namespace mlrt::bench

@@ -3,6 +3,7 @@
 #include "kdtree/report.h"
 
 #include <bit>
+#include <cstring>
 #include <mutex>
 #include <vector>
 
@@ -10,7 +11,7 @@ namespace mlrt::bench {
 
 namespace {
 
-// The rays of one tile, in the order of its pixels; reused from tile to tile.
+// The rays of one tile, in the order of the grid; reused from tile to tile.
 struct TileRays {
     std::vector<float> direction[3], t_min, t_max, t, cosine;
     std::vector<uint32_t> primitive;
@@ -37,7 +38,19 @@ struct TileRays {
     }
 };
 
+TileRays &rays_of_thread() {
+    static thread_local TileRays rays;
+    return rays;
+}
+
+// Normals of the triangles that rays hit, of any length, in the given lanes.
 Vec3<FloatPacket> normals(const KdTree &tree, const uint32_t *primitives, LaneBits lanes) {
+    // Mostly one triangle covers a packet.
+    const uint32_t first = primitives[std::countr_zero(lanes)];
+    if (to_bits(load<UIntPacket>(primitives) == first) == lanes) {
+        const Triangle &triangle = tree.triangles[first];
+        return in_all_lanes(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+    }
     LaneArray<float> along[2][3]{};
     for_each_lane(lanes, [&](uint32_t lane) {
         const Triangle &triangle = tree.triangles[primitives[lane]];
@@ -61,61 +74,81 @@ public:
                  Counters &counters)
         : tree_(tree), view_(view), options_(options), counters_(counters) {}
 
-    void trace_primary(const PixelTile &tile) {
+    void trace_primary(const RayTile &tile) {
         rays_.resize(size_t(tile.side) * tile.side);
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
             const Block block = block_of(tile, i, view_);
             const size_t first = size_t(i) * PACKET_WIDTH;
             store_vectors(first, primary_directions(view_, block));
             store(&rays_.t_min[first], FloatPacket(view_.near_clip));
-            store(&rays_.t_max[first],
-                  select(from_bits<FloatPacket>(block.on_film), FloatPacket(view_.far_clip),
-                         FloatPacket(0.0f)));
+            store(&rays_.t_max[first], in_lanes(block.on_film, view_.far_clip));
         }
-        const CameraTile square{view_.camera, tile.x, tile.y, tile.side, 1};
+        const uint32_t grid = view_.grid;
+        const CameraTile square{view_.camera, tile.x / grid, tile.y / grid,
+                                tile.side / grid, grid * grid};
         trace_closest(tree_, rays_.group(view_.camera.origin), options_,
                       {rays_.t.data(), rays_.primitive.data()}, counters_, &square);
     }
 
-    void trace_shadows(const PixelTile &tile) {
+    // Shades the hits as if all of them saw the light.
+    void write_primary(const RayTile &tile, const FrameOutput &output) {
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
             const size_t first = size_t(i) * PACKET_WIDTH;
-            const LaneBits hit =
-                to_bits(load<UIntPacket>(&rays_.primitive[first]) != NO_PRIMITIVE);
-            const auto hit_mask = from_bits<FloatPacket>(hit);
-            const FloatPacket t =
-                select(hit_mask, load<FloatPacket>(&rays_.t[first]), FloatPacket(0.0f));
-            const Shading shading = shade(view_, load_vectors(first), t,
-                                          normals(tree_, &rays_.primitive[first], hit));
+            const LaneBits hit = hits(first);
+            FloatPacket cosine = 0.0f;
+            if (hit != 0)
+                cosine = in_lanes(hit, shaded(first, hit).cosine);
+            write(tile, i, cosine, hit, output);
+        }
+    }
+
+    void trace_shadows(const RayTile &tile) {
+        for (uint32_t i = 0; i < tile.block_count(); ++i) {
+            const size_t first = size_t(i) * PACKET_WIDTH;
+            const LaneBits hit = hits(first);
+            if (hit == 0) {
+                store(&rays_.cosine[first], FloatPacket(0.0f));
+                store(&rays_.t_max[first], FloatPacket(0.0f));
+                continue;
+            }
+            const Shading shading = shaded(first, hit);
             store_vectors(first, shading.from_light);
-            store(&rays_.cosine[first],
-                  select(hit_mask, shading.cosine, FloatPacket(0.0f)));
+            store(&rays_.cosine[first], in_lanes(hit, shading.cosine));
             store(&rays_.t_min[first], FloatPacket(SHADOW_EPSILON));
-            store(&rays_.t_max[first],
-                  select(hit_mask, FloatPacket(1 - SHADOW_EPSILON), FloatPacket(0.0f)));
+            store(&rays_.t_max[first], in_lanes(hit, 1 - SHADOW_EPSILON));
         }
         trace_any(tree_, rays_.group(view_.light), options_, rays_.occluded.data(),
                   counters_);
     }
 
-    void write(const PixelTile &tile, const FrameOutput &output) {
+    void write_lit(const RayTile &tile, const FrameOutput &output) {
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
-            const Block block = block_of(tile, i, view_);
             const size_t first = size_t(i) * PACKET_WIDTH;
-            LaneBits occluded = 0;
-            for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-                occluded |= uint32_t(rays_.occluded[first + lane]) << lane;
-            write_block(view_, block,
-                        select(from_bits<FloatPacket>(occluded), FloatPacket(0.0f),
-                               load<FloatPacket>(&rays_.cosine[first])),
-                        output.image);
-            if (output.primitive)
-                write_block(view_, block, load<UIntPacket>(&rays_.primitive[first]),
-                            output.primitive);
+            const LaneBits occluded = set_bytes(&rays_.occluded[first]);
+            const auto cosine = load<FloatPacket>(&rays_.cosine[first]);
+            write(tile, i, in_lanes(ALL_LANES & ~occluded, cosine), hits(first) & ~occluded,
+                  output);
         }
     }
 
 private:
+    LaneBits hits(size_t first) const {
+        return to_bits(load<UIntPacket>(&rays_.primitive[first]) != NO_PRIMITIVE);
+    }
+
+    Shading shaded(size_t first, LaneBits hit) const {
+        const FloatPacket t = in_lanes(hit, load<FloatPacket>(&rays_.t[first]));
+        return shade(view_, load_vectors(first), t,
+                     normals(tree_, &rays_.primitive[first], hit));
+    }
+
+    void write(const RayTile &tile, uint32_t block, const FloatPacket &brightness,
+               LaneBits lit, const FrameOutput &output) const {
+        write_block(view_, block_of(tile, block, view_), brightness,
+                    load<UIntPacket>(&rays_.primitive[size_t(block) * PACKET_WIDTH]), lit,
+                    output);
+    }
+
     void store_vectors(size_t first, const Vec3<FloatPacket> &vectors) {
         for (int k = 0; k < 3; ++k)
             store(&rays_.direction[k][first], vectors[k]);
@@ -126,18 +159,24 @@ private:
                 load<FloatPacket>(&rays_.direction[2][first])};
     }
 
+    // One bit for each of sixteen bytes that are 0 or 1.
+    static LaneBits set_bytes(const uint8_t *bytes) {
+        LaneBits bits = 0;
+        for (uint32_t half = 0; half < 2; ++half) {
+            uint64_t eight;
+            std::memcpy(&eight, bytes + 8 * half, sizeof(eight));
+            // Byte i moves to bit 56 + i, and nothing else gets there or carries into it.
+            bits |= LaneBits(eight * 0x0102040810204080u >> 56) << 8 * half;
+        }
+        return bits;
+    }
+
     const KdTree &tree_;
     const View &view_;
     const TraceOptions &options_;
     Counters &counters_;
-    static thread_local TileRays rays_;
+    TileRays &rays_ = rays_of_thread();
 };
-
-thread_local TileRays TileRenderer::rays_;
-
-uint32_t tile_side(const TraceOptions &options) {
-    return std::bit_floor(std::max(options.initial_tile, BLOCK_SIDE));
-}
 
 } // namespace
 
@@ -166,14 +205,20 @@ std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &option
 }
 
 Seconds render_frame(const KdTree &tree, const View &view, const TraceOptions &options,
-                     const FrameOutput &output) {
+                     const FrameSettings &settings, const FrameOutput &output) {
     const Stopwatch watch;
-    for_each_tile(view, tile_side(options), [&](const PixelTile &tile) {
+    for_each_share(view, settings.tile_side, [&](const RayTile &share) {
         Counters counters;
         TileRenderer renderer(tree, view, options, counters);
-        renderer.trace_primary(tile);
-        renderer.trace_shadows(tile);
-        renderer.write(tile, output);
+        for_each_tile(view, share, settings.tile_side, [&](const RayTile &tile) {
+            renderer.trace_primary(tile);
+            if (settings.shadows) {
+                renderer.trace_shadows(tile);
+                renderer.write_lit(tile, output);
+            } else {
+                renderer.write_primary(tile, output);
+            }
+        });
     });
     return watch.elapsed();
 }
@@ -185,12 +230,15 @@ double sah_cost(const KdTree &tree) {
            usual.intersection_cost * statistics.expected_primitive_visits;
 }
 
-Counters count_primary(const KdTree &tree, const View &view, const TraceOptions &options) {
+Counters count_primary(const KdTree &tree, const View &view, const TraceOptions &options,
+                       uint32_t tile_side) {
     Counters total;
     std::mutex mutex;
-    for_each_tile(view, tile_side(options), [&](const PixelTile &tile) {
+    for_each_share(view, tile_side, [&](const RayTile &share) {
         Counters counters;
-        TileRenderer(tree, view, options, counters).trace_primary(tile);
+        TileRenderer renderer(tree, view, options, counters);
+        for_each_tile(view, share, tile_side,
+                      [&](const RayTile &tile) { renderer.trace_primary(tile); });
         const std::lock_guard lock(mutex);
         total += counters;
     });

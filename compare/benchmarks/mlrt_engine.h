@@ -27,12 +27,13 @@ std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &option
                                     const std::function<bool()> &cancelled);
 
 Seconds render_frame(const KdTree &tree, const View &view, const TraceOptions &options,
-                     const FrameOutput &output);
+                     const FrameSettings &settings, const FrameOutput &output);
 
 // What the builder's cost model expects of a line that crosses the scene.
 double sah_cost(const KdTree &tree);
 
 // What tracing the primary rays takes.
-Counters count_primary(const KdTree &tree, const View &view, const TraceOptions &options);
+Counters count_primary(const KdTree &tree, const View &view, const TraceOptions &options,
+                       uint32_t tile_side);
 
 } // namespace mlrt::bench

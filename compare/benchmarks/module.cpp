@@ -3,10 +3,11 @@
 #include "bind/mesh_arrays.h"
 #include "bind/trace_options.h"
 #include "bind/watch.h"
-#include "embree_engine.h"
+#include "embree_frame.h"
 #include "mlrt_engine.h"
 #include "render/camera.h"
 
+#include <bit>
 #include <malloc.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
@@ -21,6 +22,19 @@ namespace {
 
 using Image = nb::ndarray<float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 using Primitives = nb::ndarray<uint32_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+using Bytes = nb::ndarray<uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+
+const EnumNames<EmbreeMode> EMBREE_MODES{{"r16", EmbreeMode::packet},
+                                         {"NM8", EmbreeMode::stream_of_8},
+                                         {"NM16", EmbreeMode::stream_of_16},
+                                         {"1M", EmbreeMode::single_stream}};
+
+EmbreeMode embree_mode_from(const std::string &name) {
+    for (const auto &[known, mode] : EMBREE_MODES)
+        if (name == known)
+            return mode;
+    refuse_value("mode must be r16, NM8, NM16 or 1M.");
+}
 
 Mesh mesh_from(const Points &vertices, const Faces &faces) {
     Mesh mesh;
@@ -37,7 +51,7 @@ Mesh mesh_from(const Points &vertices, const Faces &faces) {
     return mesh;
 }
 
-View view_from(nb::handle dict, uint32_t width, uint32_t height) {
+View view_from(nb::handle dict, uint32_t width, uint32_t height, uint32_t grid) {
     Fields fields(dict, "view");
     Camera camera;
     camera.origin = fields.vector("origin");
@@ -52,21 +66,38 @@ View view_from(nb::handle dict, uint32_t width, uint32_t height) {
     fields.finish();
     if (width == 0 || height == 0)
         refuse_value("width and height must be positive.");
+    if (grid != 1 && grid != BLOCK_SIDE)
+        refuse_value("grid must be 1 or 4.");
     Film film;
     film.width = width;
     film.height = height;
     const ImagePlane plane = image_plane(camera, film);
-    return {plane.single, plane.near_clip, plane.far_clip, width, height, light};
+    return {plane.single, plane.near_clip, plane.far_clip, width, height, light, grid};
+}
+
+template <typename Array>
+void check_shape(const Array &array, uint32_t rows, uint32_t columns, const char *name) {
+    if (array.shape(0) != rows || array.shape(1) != columns)
+        refuse_value(std::string(name) + " must have the shape (" + std::to_string(rows) +
+                     ", " + std::to_string(columns) + ") of the view.");
 }
 
 FrameOutput output_from(const View &view, const Image &image,
-                        const std::optional<Primitives> &primitives) {
-    if (image.shape(0) != view.height || image.shape(1) != view.width)
-        refuse_value("image must have the shape (height, width) of the view.");
-    if (primitives &&
-        (primitives->shape(0) != view.height || primitives->shape(1) != view.width))
-        refuse_value("primitives must have the shape (height, width) of the view.");
-    return {image.data(), primitives ? primitives->data() : nullptr};
+                        const std::optional<Primitives> &primitives,
+                        const std::optional<Bytes> &lit) {
+    check_shape(image, view.height, view.width, "image");
+    if (primitives)
+        check_shape(*primitives, view.rows(), view.columns(), "primitives");
+    if (lit)
+        check_shape(*lit, view.rows(), view.columns(), "lit");
+    return {image.data(), primitives ? primitives->data() : nullptr,
+            lit ? lit->data() : nullptr};
+}
+
+FrameSettings settings_from(uint32_t tile_side, bool shadows) {
+    if (!std::has_single_bit(tile_side) || tile_side < BLOCK_SIDE || tile_side > 4096)
+        refuse_value("tile must be a power of two from 4 to 4096.");
+    return {tile_side, shadows};
 }
 
 TimedTree built_tree(const Mesh &mesh, const nb::dict &options_dict) {
@@ -90,10 +121,9 @@ void bind_input(nb::module_ &m) {
         nb::arg("vertices"), nb::arg("faces"));
     nb::class_<View>(m, "View").def(
         "__init__",
-        [](View *self, const nb::dict &view, uint32_t width, uint32_t height) {
-            new (self) View(view_from(view, width, height));
-        },
-        nb::arg("view"), nb::arg("width"), nb::arg("height"));
+        [](View *self, const nb::dict &view, uint32_t width, uint32_t height,
+           uint32_t grid) { new (self) View(view_from(view, width, height, grid)); },
+        nb::arg("view"), nb::arg("width"), nb::arg("height"), nb::arg("grid") = 1);
     nb::class_<Seconds>(m, "Seconds")
         .def_ro("wall", &Seconds::wall)
         .def_ro("cpu", &Seconds::cpu);
@@ -132,26 +162,33 @@ void bind_mlrt(nb::module_ &m) {
         .def(
             "render",
             [](const TimedTree &self, const View &view, const nb::dict &options,
-               const Image &image, const std::optional<Primitives> &primitives) {
+               const Image &image, const std::optional<Primitives> &primitives,
+               const std::optional<Bytes> &lit, uint32_t tile, bool shadows) {
                 const TraceOptions trace_options = trace_options_from(options);
-                const FrameOutput output = output_from(view, image, primitives);
+                const FrameSettings settings = settings_from(tile, shadows);
+                const FrameOutput output = output_from(view, image, primitives, lit);
                 nb::gil_scoped_release release;
-                return render_frame(self.built.tree, view, trace_options, output);
+                return render_frame(self.built.tree, view, trace_options, settings, output);
             },
             nb::arg("view"), nb::arg("options"), nb::arg("image"),
-            nb::arg("primitives").none() = nb::none())
+            nb::arg("primitives").none() = nb::none(), nb::arg("lit").none() = nb::none(),
+            nb::arg("tile") = FrameSettings().tile_side,
+            nb::arg("shadows") = FrameSettings().shadows)
         .def(
             "count_primary",
-            [](const TimedTree &self, const View &view, const nb::dict &options) {
+            [](const TimedTree &self, const View &view, const nb::dict &options,
+               uint32_t tile) {
                 const TraceOptions trace_options = trace_options_from(options);
+                const uint32_t side = settings_from(tile, false).tile_side;
                 Counters counters;
                 {
                     nb::gil_scoped_release release;
-                    counters = count_primary(self.built.tree, view, trace_options);
+                    counters = count_primary(self.built.tree, view, trace_options, side);
                 }
                 return counters_to_dict(counters);
             },
-            nb::arg("view"), nb::arg("options"));
+            nb::arg("view"), nb::arg("options"),
+            nb::arg("tile") = FrameSettings().tile_side);
 }
 
 void bind_embree(nb::module_ &m) {
@@ -176,12 +213,18 @@ void bind_embree(nb::module_ &m) {
         .def(
             "render",
             [](const EmbreeScene &self, const View &view, const Image &image,
-               const std::optional<Primitives> &primitives) {
-                const FrameOutput output = output_from(view, image, primitives);
+               const std::optional<Primitives> &primitives, const std::optional<Bytes> &lit,
+               const std::string &mode_name, uint32_t tile, bool shadows) {
+                const EmbreeMode mode = embree_mode_from(mode_name);
+                const FrameSettings settings = settings_from(tile, shadows);
+                const FrameOutput output = output_from(view, image, primitives, lit);
                 nb::gil_scoped_release release;
-                return render_frame(self, view, output);
+                return render_frame(self, mode, view, settings, output);
             },
-            nb::arg("view"), nb::arg("image"), nb::arg("primitives").none() = nb::none());
+            nb::arg("view"), nb::arg("image"), nb::arg("primitives").none() = nb::none(),
+            nb::arg("lit").none() = nb::none(), nb::arg("mode") = "r16",
+            nb::arg("tile") = FrameSettings().tile_side,
+            nb::arg("shadows") = FrameSettings().shadows);
 }
 
 } // namespace
@@ -195,6 +238,10 @@ NB_MODULE(MLRT_MODULE, m) {
         "release_memory", [] { malloc_trim(0); },
         "Returns freed memory to the system, so that the next piece of work starts as in "
         "a fresh process.");
+    m.def(
+        "check_trace_options",
+        [](const nb::dict &options) { mlrt::trace_options_from(options); },
+        nb::arg("options"), "Raises ValueError or TypeError for what the tracer refuses.");
     bind_input(m);
     bind_mlrt(m);
     bind_embree(m);

@@ -188,6 +188,19 @@ void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
 }
 
+// Lanes 0 to 7 to one place, lanes 8 to 15 to another.
+template <typename Packet, typename Value>
+void store_halves(Value *low, Value *high, const Packet &packet) {
+    drjit::store(low, drjit::low(packet));
+    drjit::store(high, drjit::high(packet));
+}
+
+template <typename Packet, typename Value>
+Packet load_halves(const Value *low, const Value *high) {
+    using Half = std::decay_t<decltype(drjit::low(Packet()))>;
+    return Packet(drjit::load<Half>(low), drjit::load<Half>(high));
+}
+
 // A value a lane in memory, for what is computed or looked up lane by lane.
 template <typename Value>
 struct alignas(64) LaneArray : std::array<Value, PACKET_WIDTH> {};

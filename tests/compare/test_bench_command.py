@@ -1,27 +1,25 @@
-"""mlrt-bench as a command: figures, files, and one sentence for everything that goes wrong.
-
-The native side is compiled once, into a folder of the test session."""
+"""mlrt-bench build as a command: figures, files, and one sentence for everything that goes
+wrong."""
 
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import oracles
 import pytest
 import repository
+from bench_command import assert_one_sentence, command
+from bench_rays import expected_rays
 from mlrt_compare.bench import native as bench_native
 from mlrt_compare.bench.checkout import find_checkout
 from mlrt_compare.bench.contenders import contenders_of, embree_device
 from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.native import Native, load_native
 from mlrt_compare.bench.peak import resident_peaks
-from mlrt_compare.bench.scenes import BenchScene, GeneratedScene, chosen_scenes
+from mlrt_compare.bench.scenes import BenchScene, GeneratedScene
 from numpy.typing import NDArray
 
 from mlrt_plugin import KdTree
@@ -31,47 +29,6 @@ SCENE = repository.ROOT / "scenes" / "office" / "office.xml"
 NODE_BYTES, REFERENCE_BYTES, TRIANGLE_BYTES = 8, 4, 36
 ENDS = ("near", "far")
 NAMES = ["MLRT exact", "MLRT fast", "MLRT lazy", "Embree MEDIUM", "Embree HIGH"]
-
-
-@pytest.fixture(scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("cache")
-
-
-@pytest.fixture(scope="module")
-def native(cache: Path) -> Native:
-    try:
-        bench_native.find_tools()
-    except BenchError as error:
-        pytest.skip(str(error))
-    return load_native(repository.ROOT, cache)
-
-
-@pytest.fixture(scope="module")
-def office(cache: Path) -> BenchScene:
-    return chosen_scenes(["office"], repository.ROOT)[0].load(cache)
-
-
-def command(
-    *arguments: object, cwd: Path = repository.ROOT, **environment: str
-) -> subprocess.CompletedProcess[str]:
-    # -P: a checkout that is the current folder holds packages without native core.
-    return subprocess.run(
-        [sys.executable, "-P", "-m", "mlrt_compare.bench", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        cwd=cwd,
-        env={**os.environ, **environment},
-    )
-
-
-def assert_one_sentence(child: subprocess.CompletedProcess[str], *said: str) -> None:
-    assert child.returncode == 4, child.stdout + child.stderr
-    lines = child.stderr.strip().splitlines()
-    assert len(lines) == 1 and lines[0].startswith("mlrt-bench: "), child.stderr
-    for words in said:
-        assert words in lines[0]
 
 
 @pytest.fixture(scope="module")
@@ -204,51 +161,11 @@ def test_nothing_to_measure_is_an_error(native: Native, cache: Path) -> None:
     assert_one_sentence(child, "none of the scenes is there")
 
 
-def expected_frame(
-    scene: BenchScene, side: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
-    """Faces, brightness and visibility of the frame by textbook formulas in double."""
-    view = {key: np.asarray(value, np.float64) for key, value in scene.view.items()}
-    at = (np.arange(side) + 0.5) / side
-    x, y = (axis.ravel() for axis in np.meshgrid(1 - 2 * at, 1 - 2 * at))
-    tan = view["tan_half_fov_x"]
-    directions = (
-        view["axis_z"]
-        + np.outer(tan * x, view["axis_x"])
-        + np.outer(tan * y, view["axis_y"])
-    )
-    origins = np.broadcast_to(view["origin"], directions.shape)
-    t, face = oracles.double_hits(
-        scene.vertices,
-        scene.faces,
-        origins,
-        directions,
-        float(view["near_clip"]),
-        float(view["far_clip"]),
-    )
-    hit = face >= 0
-    corners = scene.vertices[scene.faces[face]].astype(np.float64)
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    to_hit = origins + np.where(hit, t, 0)[:, None] * directions - view["light"]
-    shadow_t, _ = oracles.double_hits(
-        scene.vertices,
-        scene.faces,
-        np.broadcast_to(view["light"], to_hit.shape),
-        to_hit,
-        1e-4,
-        1 - 1e-4,
-    )
-    lit = hit & np.isinf(shadow_t)
-    cosine = np.abs(np.einsum("ij,ij->i", normals, to_hit)) / (
-        np.linalg.norm(normals, axis=1) * np.linalg.norm(to_hit, axis=1)
-    )
-    return face, np.where(lit, cosine, 0), lit
-
-
 def test_frame_is_that_of_textbook_formulas(native: Native, office: BenchScene) -> None:
     """Of every contender, on a film of which no tile or packet is a part."""
     side = 37
-    face, brightness, lit = expected_frame(office, side)
+    face, cosine, lit = expected_rays(office, side)
+    brightness = np.where(lit, cosine, 0)
     assert 0.3 < lit.mean() < 0.99 and len(np.unique(face)) > 50
     module = native.module
     mesh = module.Mesh(office.vertices, office.faces)
@@ -305,6 +222,12 @@ def test_peak_memory_holds_what_was_built(native: Native, cache: Path) -> None:
         (("build", "--json", SCENE.parent), "is a folder"),
         (("build", "--json", SCENE.parent / "no" / "such.json"), "no folder"),
         (("build", "--images", SCENE), "is not a folder"),
+        (("rays", "--spp", "4"), "4 samples a pixel: choose 1 or 16"),
+        (("rays", "--tiles", "16,24"), "24 is not a power of two"),
+        (("rays", "--trace", "interval"), "'interval' is not of the form KEY=VALUE"),
+        (("rays", "--json", SCENE.parent), "is a folder"),
+        (("frames", "--spp", "0"), "0 is not from 1"),
+        (("frames", "--scenes", "bunny"), "no scene 'bunny'"),
         (("build", "--source", SCENE.parent), "not a source checkout"),
     ],
 )

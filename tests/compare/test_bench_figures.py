@@ -6,9 +6,12 @@ from typing import Any
 
 import pytest
 from bench_figures import block, run
-from mlrt_compare.bench import build_table
+from mlrt_compare.bench import build_table, table
+from mlrt_compare.bench.frame_runs import FrameRun, measured_in_turns, needs_run
 from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
 from mlrt_compare.bench.measure import Timing, in_turns
+from mlrt_compare.bench.rays_contenders import ray_contenders
+from mlrt_compare.bench.speedup import Speedup, ratio_lines, speedup
 
 QUIET = Timing(wall=1.0, cpu=1.9, waited=0.0)
 
@@ -106,11 +109,11 @@ def test_lazy_growth_is_to_pay_in_large_scenes_only() -> None:
     ],
 )
 def test_numbers(value: float | None, text: str) -> None:
-    assert build_table.number(value) == text
+    assert table.number(value) == text
 
 
 def test_columns_stand_below_one_another() -> None:
-    lines = build_table.aligned([("", "a", "long head"), ("name", "12.5", "3")])
+    lines = table.aligned([("", "a", "long head"), ("name", "12.5", "3")])
     assert lines == ["         a  long head", "name  12.5          3"]
 
 
@@ -147,3 +150,86 @@ def test_goals_form_a_table() -> None:
     assert lines[2].startswith("building, 2 threads")
     assert lines[2].count("met") == 4 and lines[2].count("missed") == 1
     assert build_table.goal_lines([other]) == []
+
+
+def frame_run(wall: float, frames: int = 1, busy: bool = False) -> FrameRun:
+    return FrameRun(Timing(wall, 2 * wall, 0.0), frames, busy)
+
+
+def test_frames_run_until_enough_were_left_alone_or_took_long() -> None:
+    quiet, disturbed = frame_run(1.0), frame_run(1.0, busy=True)
+    assert needs_run([disturbed, quiet], 2, enough=60.0)
+    assert not needs_run([disturbed, quiet, quiet], 2, enough=60.0)
+    assert needs_run([frame_run(9.0)], 2, enough=5.0)
+    assert not needs_run([disturbed, frame_run(0.5, frames=10)], 2, enough=5.0)
+
+
+def test_frames_are_taken_in_turns() -> None:
+    seen: list[tuple[str, int]] = []
+
+    def contender(name: str, number: int) -> FrameRun:
+        seen.append((name, number))
+        return frame_run(1.0, busy=name == "B" and number == 0)
+
+    runs = measured_in_turns(
+        [lambda n, name=name: contender(name, n) for name in "AB"], 2, enough=60.0
+    )
+    assert seen == [("A", 0), ("B", 0), ("B", 1), ("A", 1), ("B", 2)]
+    assert [len(done) for done in runs] == [2, 3]
+
+
+def frames_of(*walls: float) -> dict[str, Any]:
+    return {"runs": [frame_run(wall).as_dict() for wall in walls]}
+
+
+def test_speedup_is_beside_the_fastest_peer_by_each_figure() -> None:
+    found = speedup(frames_of(1.0, 2.0), [frames_of(3.0, 9.0), frames_of(4.0, 5.0)], 3.0, 4)
+    assert (found.best, found.median, found.cpu) == pytest.approx((3.0, 3.0, 3.0))
+    assert (found.verdict, found.stretch_verdict) == ("met", "missed")
+
+
+@pytest.mark.parametrize(
+    ("best", "median", "goal", "verdict"),
+    [
+        (2.0, 2.0, 2.0, "met"),
+        (1.9, 1.9, 2.0, "missed"),
+        (2.1, 1.9, 2.0, "open"),
+        (2.1, 1.9, None, "not a goal"),
+    ],
+)
+def test_speedup_is_to_reach_its_goal(
+    best: float, median: float, goal: float | None, verdict: str
+) -> None:
+    assert Speedup(best, median, 1.0, goal, None).verdict == verdict
+
+
+def test_speedups_form_a_table() -> None:
+    def figures(threads: int, kind: str, best: float) -> dict[str, Any]:
+        one = Speedup(best, best, best, 2.0, 3.0)
+        return {"threads": threads, "kind": kind, "speedup": one.as_dict()}
+
+    scenes = [
+        {"name": "office", "blocks": [figures(1, "a", 2.5), figures(2, "b", 3.5)]},
+        {"name": "absent", "skipped": "there is no absent.xml"},
+    ]
+    lines = ratio_lines("ratios", scenes, lambda block: block["kind"])
+    assert [" ".join(line.split()) for line in lines[1:]] == [
+        "ratios a b",
+        "office, 1 thread 2.50 (2.50, CPU 2.50): goal 2 met, stretch 3 missed -",
+        "office, 2 threads - 3.50 (3.50, CPU 3.50): goal 2 met, stretch 3 met",
+    ]
+    assert ratio_lines("ratios", scenes[1:], lambda block: block["kind"]) == []
+
+
+def test_every_mode_of_embree_is_tried_with_every_tile() -> None:
+    tried = {
+        contender.name: [(variant.call, variant.tile) for variant in contender.variants]
+        for contender in ray_contenders(None, {"MEDIUM": None, "HIGH": None}, {}, (16, 64))
+    }
+    assert tried.pop("MLRT") == [("group", 16), ("group", 64)]
+    for quality in ("MEDIUM", "HIGH"):
+        assert tried.pop(f"Embree {quality} r16") == [("r16", 64)]
+        streams = {call: tried.pop(f"Embree {quality} {call}") for call in ("NM", "1M")}
+        assert streams["NM"] == [(f"NM{n}", tile) for n in (8, 16) for tile in (16, 64)]
+        assert streams["1M"] == [("1M", 16), ("1M", 64)]
+    assert not tried

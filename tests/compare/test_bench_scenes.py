@@ -9,26 +9,26 @@ import numpy as np
 import pytest
 import repository
 from mlrt_compare.bench.errors import BenchError
-from mlrt_compare.bench.scenes import GeneratedScene, chosen_scenes, imported
+from mlrt_compare.bench.scenes import GeneratedScene, chosen_scenes, imported, usual_scenes
 
 DRAGON = repository.ROOT / "scenes" / "dragon"
 
 
 def test_usual_scenes_are_those_of_the_published_table() -> None:
-    names = [scene.name for scene in chosen_scenes(None, repository.ROOT)]
+    names = [scene.name for scene in chosen_scenes(None, usual_scenes(repository.ROOT))]
     assert names == ["office", "conference", "building", "dragon-2.2M", "dragon-7.2M"]
-    chosen = chosen_scenes(["dragon-7.2M", "some/room.xml"], repository.ROOT)
+    chosen = chosen_scenes(["dragon-7.2M", "some/room.xml"], usual_scenes(repository.ROOT))
     assert [scene.name for scene in chosen] == ["dragon-7.2M", "room"]
 
 
 def test_unknown_scene_is_refused_by_name() -> None:
     with pytest.raises(BenchError, match="no scene 'bunny': choose from office, conf"):
-        chosen_scenes(["office", "bunny"], repository.ROOT)
+        chosen_scenes(["office", "bunny"], usual_scenes(repository.ROOT))
 
 
 def test_missing_scene_says_what_to_do(tmp_path: Path) -> None:
     checkout = tmp_path / "mlrt"
-    conference = chosen_scenes(["conference"], checkout)[0]
+    conference = chosen_scenes(["conference"], usual_scenes(checkout))[0]
     with pytest.raises(BenchError, match=r"no .*conference\.xml: put the conference room"):
         conference.load(tmp_path)
 

@@ -13,17 +13,16 @@ import numpy.typing as npt
 
 from mlrt_plugin.threads import thread_count
 
-from .build_table import plural
+from .ats import traversal_steps
 from .contenders import EMBREE, MLRT, WARM_UP_FACES, Contender, contenders_of, embree_device
 from .goals import goals_of
-from .measure import Run, in_turns, timed
+from .measure import ROUNDS_A_REPEAT, Run, in_turns, timed
 from .native import Native
 from .peak import resident_peaks
 from .scenes import BenchScene
 from .status import show_status
+from .table import plural
 
-ROUNDS_A_REPEAT = 3
-"""Runs that others disturb do not count and are repeated, within this limit; chosen."""
 BACKGROUND = 0xFFFFFFFF
 LARGEST_DIFFERENCE = 1e-3
 """Of the brightness of a pixel that two engines agree on."""
@@ -163,13 +162,8 @@ class SceneBenchmark:
             }
 
     def _steps(self, tree: Any, entry_points: bool) -> float:
-        """ATS of interval traversal: nodes visited for each 16 primary rays, those of entry
-        point searches included."""
-        counted = tree.count_primary(
-            self._view, {"traversal": "interval", "entry_points": entry_points}
-        )
-        steps = counted["entry_steps"] + counted["traversal_steps"]
-        return 16 * float(steps) / self._image.size
+        options = {"traversal": "interval", "entry_points": entry_points}
+        return traversal_steps(tree, self._view, self._image.size, options)
 
 
 def growth(tree: Any) -> dict[str, float]:

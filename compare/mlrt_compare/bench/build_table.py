@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .goals import counted_runs, seconds
-from .measure import best, median
+from .measure import best
+from .table import aligned, machine_lines, megabytes, number, plural, spread
 
 COLUMNS = (
     *("", "build s", "CPU s", "frame s", "CPU s", "build + frame s", "runs"),
@@ -13,12 +14,9 @@ COLUMNS = (
 )
 
 
-def machine_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
+def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
     return [
-        f"{machine['processor']}, {machine['cores']} cores, {machine['isa']}, "
-        f"{machine['compiler']}",
-        f"MLRT {machine['mlrt']} at {(machine['commit'] or 'no commit')[:10]}, Embree of "
-        f"Mitsuba {machine['mitsuba']}; load {machine['load'][0]:.1f}",
+        *machine_lines(machine),
         f"frame: {settings['resolution']} x {settings['resolution']}, a primary ray a "
         "pixel and a shadow ray a hit; seconds: best (median) of the runs that others left "
         "alone, which are counted of all runs",
@@ -96,39 +94,3 @@ def verdict(goal: dict[str, Any]) -> str:
     if goal["median"] != goal["best"]:
         ratio += f" ({goal['median']:.2f})"
     return f"{ratio} {goal['verdict']}"
-
-
-def plural(threads: int) -> str:
-    return f"{threads} thread{'s' if threads != 1 else ''}"
-
-
-def spread(values: list[float]) -> str:
-    return f"{number(best(values))} ({number(median(values))})"
-
-
-def number(value: float | None) -> str:
-    """Three significant digits, never in powers of ten."""
-    if value is None:
-        return "-"
-    if value == 0:
-        return "0"
-    digits = 2
-    while digits < 7 and abs(value) < 10 ** (2 - digits):
-        digits += 1
-    return f"{value:.0f}" if abs(value) >= 100 else f"{value:.{digits}f}"
-
-
-def megabytes(count: float) -> str:
-    return number(count / 1e6)
-
-
-def aligned(rows: list[tuple[str, ...]]) -> list[str]:
-    """Columns of equal width: the first to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            [row[0].ljust(widths[0])]
-            + [cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)]
-        ).rstrip()
-        for row in rows
-    ]

@@ -29,11 +29,17 @@ class Goal:
     def verdict(self) -> str:
         if not self.is_set:
             return "not a goal"
-        met = {self.best <= self.limit, self.median <= self.limit}
-        return "open" if len(met) == 2 else "met" if True in met else "missed"
+        return judged(self.best <= self.limit, self.median <= self.limit)
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "verdict": self.verdict}
+
+
+def judged(by_best: bool, by_median: bool) -> str:
+    """A verdict on a goal; it is open if only one of both figures reaches it."""
+    if by_best != by_median:
+        return "open"
+    return "met" if by_best else "missed"
 
 
 def counted_runs(contender: dict[str, Any]) -> list[dict[str, Any]]:

@@ -19,8 +19,11 @@ HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage/enabled")
 GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 
 
-def machine_record(source: Path, native: Native) -> dict[str, Any]:
-    """As JSON has it; None for what cannot be found out."""
+def machine_record(source: Path, native: Native | None) -> dict[str, Any]:
+    """As JSON has it; None for what cannot be found out.
+
+    native: if it is measured, what is compiled for benchmarks.
+    """
     return {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "processor": processor(),
@@ -31,8 +34,8 @@ def machine_record(source: Path, native: Native) -> dict[str, Any]:
         "kernel": f"{platform.system()} {platform.release()}",
         "load": list(os.getloadavg()),
         "isa": mlrt_plugin.isa,
-        "compiler": native.compiler,
-        "flags": native.flags,
+        "compiler": None if native is None else native.compiler,
+        "flags": None if native is None else native.flags,
         "python": platform.python_version(),
         "mlrt": mlrt_plugin.__version__,
         "commit": commit(source),

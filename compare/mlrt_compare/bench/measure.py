@@ -13,6 +13,8 @@ T = TypeVar("T")
 WAITING_LIMIT = 0.1
 """Share of the time that threads may stand in line for a processor; chosen, as the spread
 that published figures may have."""
+ROUNDS_A_REPEAT = 3
+"""Runs that others disturb do not count and are repeated, within this limit; chosen."""
 OWN_PROCESS = Path("/proc/self")
 
 

@@ -7,6 +7,8 @@ import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -47,10 +49,13 @@ class SceneFile:
     path: Path
     remedy: str
 
-    def load(self, cache: Path) -> BenchScene:
+    def file(self, cache: Path) -> Path:
         if not self.path.is_file():
             raise BenchError(f"there is no {self.path}: {self.remedy}")
-        return imported(self.name, self.path)
+        return self.path
+
+    def load(self, cache: Path) -> BenchScene:
+        return imported(self.name, self.file(cache))
 
 
 @dataclass(frozen=True)
@@ -70,26 +75,39 @@ class GeneratedScene:
             digest.update(path.read_bytes())
         return digest.hexdigest()[:16]
 
+    def file(self, cache: Path) -> Path:
+        """The scene as XML, which stays in the cache."""
+        folder = cache / "scenes" / f"{self.name}-{self.key()}"
+        if not folder.is_dir():
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            with self.generated(folder.parent) as written:
+                written.parent.rename(folder)
+        return folder / f"{self.folder.name}.xml"
+
     def load(self, cache: Path) -> BenchScene:
         stored = cache / "scenes" / f"{self.name}-{self.key()}.npz"
         if not stored.is_file():
             stored.parent.mkdir(parents=True, exist_ok=True)
-            store(stored, self.generated(stored.parent))
+            with self.generated(stored.parent) as written:
+                store(stored, imported(self.name, written))
         return read_stored(stored, self.name)
 
-    def generated(self, folder: Path) -> BenchScene:
+    @contextmanager
+    def generated(self, folder: Path) -> Iterator[Path]:
+        """Writes the scene to a temporary folder in the given one; the XML file."""
         print(f"mlrt-bench: generating {self.name}", file=sys.stderr, flush=True)
-        with tempfile.TemporaryDirectory(dir=folder, prefix=".generated-") as output:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".generated-") as temporary:
+            output = Path(temporary) / "scene"
             command = [
                 *(sys.executable, str(self.folder / "generate.py")),
                 *("--triangles", str(self.triangles), "--seed", str(self.seed)),
-                *("-o", output),
+                *("-o", str(output)),
             ]
             child = subprocess.run(command, capture_output=True, text=True)
             if child.returncode != 0:
                 reason = (child.stderr.strip() or "no message").splitlines()[-1]
                 raise BenchError(f"the scene {self.name} cannot be generated: {reason}")
-            return imported(self.name, Path(output) / f"{self.folder.name}.xml")
+            yield output / f"{self.folder.name}.xml"
 
 
 SceneSource = SceneFile | GeneratedScene
@@ -111,14 +129,25 @@ def usual_scenes(source: Path) -> list[SceneSource]:
     ]
 
 
-def chosen_scenes(names: list[str] | None, source: Path) -> list[SceneSource]:
+def scenes_of_rays(source: Path) -> list[SceneSource]:
+    """The usual ones of `mlrt-bench rays`."""
+    sponza = source.parent / "shared" / "scenes" / "sponza" / "sponza.xml"
+    remedy = "put the atrium there, which may not be passed on with MLRT"
+    return [
+        *(scene for scene in usual_scenes(source) if scene.name != "dragon-2.2M"),
+        SceneFile("sponza", sponza, remedy),
+    ]
+
+
+def chosen_scenes(
+    names: list[str] | None, usual: Sequence[SceneSource]
+) -> list[SceneSource]:
     """Scenes by name, or by the path of an XML file; all usual ones for None.
 
     Raises BenchError for a name that is neither.
     """
-    usual = usual_scenes(source)
     if names is None:
-        return usual
+        return list(usual)
     by_name = {scene.name: scene for scene in usual}
     chosen: list[SceneSource] = []
     for name in names:

@@ -1,0 +1,159 @@
+"""Options that the commands of mlrt-bench share, and what is refused."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from .errors import BenchError
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports a wrong call in one sentence, with the exit code for what could not run."""
+
+    def error(self, message: str) -> NoReturn:
+        raise BenchError(f"{message} (see {self.prog} --help)")
+
+
+def add_shared_options(
+    command: argparse.ArgumentParser, *, repeats: int, scenes: str = "all usual ones"
+) -> None:
+    """Those that every command has. ``repeats``, ``scenes``: the usual ones."""
+    command.add_argument(
+        "--json", type=Path, metavar="FILE", help="write all figures there"
+    )
+    command.add_argument(
+        "--scenes",
+        type=names,
+        metavar="A,B",
+        help=f"names of usual scenes or XML files ({scenes})",
+    )
+    command.add_argument(
+        "--threads",
+        type=counts,
+        default=(1, 2),
+        metavar="N,M",
+        help="numbers of them (1,2)",
+    )
+    command.add_argument(
+        "--repeats",
+        type=count,
+        default=repeats,
+        metavar="N",
+        help="runs of each (%(default)s)",
+    )
+    command.add_argument(
+        "--resolution",
+        type=count,
+        default=1024,
+        metavar="N",
+        help="pixels along both sides of the frame (%(default)s)",
+    )
+    command.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="folder for generated scenes and the native side (~/.cache/mlrt-bench)",
+    )
+    command.add_argument(
+        "--source",
+        type=Path,
+        metavar="DIR",
+        help="MLRT's source checkout (the current one)",
+    )
+
+
+def add_sample_counts(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--spp",
+        type=sample_counts,
+        default=(1, 16),
+        metavar="N,M",
+        help="samples a pixel, 1 or 16 (1,16)",
+    )
+
+
+def check_json(path: Path | None) -> None:
+    """Raises BenchError for a file that could not be written after all the work."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise BenchError(f"the file {path} to write figures to is a folder")
+    check_folder_of(path)
+
+
+def check_folder_of(path: Path) -> None:
+    if not path.absolute().parent.is_dir():
+        raise BenchError(f"there is no folder {path.parent} to write {path} to")
+
+
+def check_threads(threads: Sequence[int]) -> None:
+    """Raises BenchError for more threads than Embree can be built with."""
+    # Its tasks' storage has room for twice the processors (taskschedulerinternal.h).
+    limit = 2 * (os.cpu_count() or 1)
+    if max(threads) > limit:
+        raise BenchError(
+            f"{max(threads)} threads are too many: Embree takes at most {limit} on this "
+            "machine"
+        )
+
+
+def default_cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "mlrt-bench"
+
+
+def names(text: str) -> list[str]:
+    found = [name.strip() for name in text.split(",") if name.strip()]
+    if not found:
+        raise argparse.ArgumentTypeError("no scene is named")
+    return list(dict.fromkeys(found))
+
+
+def count(text: str) -> int:
+    limit = 2**14
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+    if not 1 <= value <= limit:
+        raise argparse.ArgumentTypeError(f"{value} is not from 1 to {limit}")
+    return value
+
+
+def counts(text: str) -> tuple[int, ...]:
+    return tuple(dict.fromkeys(count(part) for part in text.split(",")))
+
+
+def sizes(text: str) -> tuple[int, ...]:
+    """Powers of two from 4 to 1024."""
+    found = counts(text)
+    for size in found:
+        if not 4 <= size <= 1024 or size & (size - 1):
+            raise argparse.ArgumentTypeError(f"{size} is not a power of two from 4 to 1024")
+    return found
+
+
+def sample_counts(text: str) -> tuple[int, ...]:
+    found = counts(text)
+    for value in found:
+        if value not in (1, 16):
+            raise argparse.ArgumentTypeError(f"{value} samples a pixel: choose 1 or 16")
+    return found
+
+
+def settings_of_tracing(text: str) -> dict[str, int | bool | str]:
+    """Options of the tracer: numbers, `true` and `false`, and names."""
+    settings: dict[str, int | bool | str] = {}
+    for part in text.split(","):
+        key, equals, value = part.partition("=")
+        if not (key and equals and value):
+            raise argparse.ArgumentTypeError(f"{part!r} is not of the form KEY=VALUE")
+        if value in ("true", "false"):
+            settings[key] = value == "true"
+        else:
+            settings[key] = int(value) if value.isdecimal() else value
+    return settings

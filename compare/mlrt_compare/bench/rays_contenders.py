@@ -1,0 +1,79 @@
+"""Who traces rays: MLRT, and Embree in each of its modes and build qualities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from .contenders import EMBREE, MLRT, QUALITIES
+from .frame_runs import FrameRun
+
+EMBREE_MODES = {"r16": ("r16",), "NM": ("NM8", "NM16"), "1M": ("1M",)}
+"""Ways in which Embree takes many rays, by what the native side calls their variants:
+coherent packets of 16, coherent streams of packets of 8 or 16, incoherent streams."""
+Render = Callable[..., Any]
+"""Of the view, the image and keywords; returns seconds."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A way to call a tracer that changes nothing but its speed."""
+
+    call: str
+    tile: int
+    """Rays along the side of what is handed over at once."""
+    render: Render
+
+
+@dataclass
+class RayContender:
+    """An engine's mode, and what came of it."""
+
+    engine: str
+    kind: str
+    """Of an Embree contender the build quality and the mode."""
+    variants: Sequence[Variant]
+    chosen: Variant | None = None
+    """The quickest variant."""
+    tuning: list[dict[str, Any]] = field(default_factory=list)
+    runs: list[FrameRun] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return f"{self.engine} {self.kind}".strip()
+
+
+def ray_contenders(
+    tree: Any, scenes: dict[str, Any], trace: dict[str, Any], tiles: Sequence[int]
+) -> list[RayContender]:
+    """``scenes``: Embree's, by build quality. ``trace``: options of MLRT's tracer."""
+
+    def mlrt(tile: int) -> Variant:
+        return Variant(
+            "group",
+            tile,
+            lambda view, image, **keywords: tree.render(
+                view, trace, image, tile=tile, **keywords
+            ),
+        )
+
+    def embree(scene: Any, call: str, tile: int) -> Variant:
+        return Variant(
+            call,
+            tile,
+            lambda view, image, **keywords: scene.render(
+                view, image, mode=call, tile=tile, **keywords
+            ),
+        )
+
+    contenders = [RayContender(MLRT, "", [mlrt(tile) for tile in tiles])]
+    for quality in QUALITIES:
+        for mode, calls in EMBREE_MODES.items():
+            # A packet is traced as soon as it is made, whatever the tile.
+            sides = tiles if mode != "r16" else (max(tiles),)
+            variants = [
+                embree(scenes[quality], call, tile) for call in calls for tile in sides
+            ]
+            contenders.append(RayContender(EMBREE, f"{quality} {mode}", variants))
+    return contenders

@@ -1,0 +1,50 @@
+"""How many times as fast as the best mode of Embree rays are meant to be traced."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .contenders import EMBREE, MLRT
+from .measure import best
+from .speedup import Speedup, frame_seconds, speedup
+
+Work = tuple[int, bool]
+"""Samples a pixel, and whether there are shadow rays."""
+GOALS: dict[Work, dict[str, tuple[float, float | None]]] = {
+    (1, False): {
+        "office": (4.5, 6.0),
+        "conference": (2.0, 3.0),
+        "building": (3.5, 5.0),
+        "dragon-7.2M": (1.3, 2.5),
+    },
+    (1, True): {
+        "office": (3.5, 5.0),
+        "conference": (1.3, 2.0),
+        "building": (2.0, 3.0),
+        "dragon-7.2M": (1.0, 1.5),
+    },
+    (16, False): {
+        "office": (4.0, None),
+        "conference": (2.5, None),
+        "building": (2.5, None),
+        "dragon-7.2M": (1.5, None),
+    },
+}
+"""Goal and stretch goal by scene."""
+
+
+def ray_speedup(scene: str, block: dict[str, Any]) -> Speedup:
+    """Of MLRT beside whichever mode of Embree is the fastest."""
+    contenders = block["contenders"]
+    own = next(c for c in contenders if c["engine"] == MLRT)
+    goals = GOALS.get((block["spp"], block["shadows"]), {})
+    return speedup(own, peers_of(block), *goals.get(scene, (None, None)))
+
+
+def peers_of(block: dict[str, Any]) -> list[dict[str, Any]]:
+    return [c for c in block["contenders"] if c["engine"] == EMBREE]
+
+
+def fastest_peer(block: dict[str, Any]) -> dict[str, Any]:
+    """The contender of Embree with the best frame on the clock."""
+    return min(peers_of(block), key=lambda peer: best(frame_seconds(peer, "wall")))
