@@ -242,7 +242,7 @@ def test_leaves_of_large_scenes_hold_what_overlaps_them(builder: str, scene: str
     """What a sample of the triangles overlaps, and what overlaps a sample of the leaves."""
     rng = np.random.default_rng(SEED)
     triangles = LARGE_SCENES[scene](rng)
-    tree = BuiltTree(triangles, **BUILDERS[builder])
+    tree = BuiltTree(triangles, **BUILDERS[builder], intersection_cost=1.5)
     leaves = Leaves(tree, list(tree.leaves()))
     assert_all_is_there(tree, leaves)
     assert len(leaves.visits) > 3000

@@ -140,7 +140,7 @@ def test_no_cell_below_the_area_floor_is_split() -> None:
         scene = visits[0].area
         return min(v.area / scene for v in visits if not tree.is_leaf(v.node))
 
-    with_floor = BuiltTree(triangles, area_floor=floor)
+    with_floor = BuiltTree(triangles, intersection_cost=1.5, area_floor=floor)
     assert smallest(with_floor) >= floor
     assert with_floor.report["area_floor_leaves"] > 0
     below = [
@@ -151,7 +151,7 @@ def test_no_cell_below_the_area_floor_is_split() -> None:
         and v.area < floor * next(with_floor.walk()).area
     ]
     assert with_floor.report["area_floor_leaves"] == len(below)
-    without = BuiltTree(triangles, rule_area_floor=False)
+    without = BuiltTree(triangles, intersection_cost=1.5, rule_area_floor=False)
     assert smallest(without) < floor
     assert without.report["area_floor_leaves"] == 0
 
