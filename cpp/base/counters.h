@@ -10,21 +10,26 @@ struct Counters {
     uint64_t packets = 0;         // groups of up to 16 rays that were traced
     uint64_t entry_steps = 0;     // nodes visited by entry point searches, leaves included
     uint64_t traversal_steps = 0; // nodes visited by packets, leaves included
-    uint64_t leaf_visits = 0;     // of which leaves
+    uint64_t leaf_visits = 0;     // leaves visited by packets and beams
     uint64_t frontier_tests = 0;  // packets clipped to further cells of a frontier
     uint64_t triangle_tests = 0;  // packet against triangle
-    uint64_t beams = 0;             // that went on to leaves
-    uint64_t beam_steps = 0;        // nodes visited by them, leaves included
-    uint64_t beam_blocks = 0;       // up to eight triangles against a beam
-    uint64_t beam_triangles = 0;    // triangles that a beam may hit
+    uint64_t beams = 0;           // that went on to leaves (X4)
+    uint64_t beam_steps = 0;      // nodes visited by them, leaves included
+    uint64_t beam_blocks = 0;     // up to eight triangles against a beam
+    uint64_t beam_triangles = 0;  // triangles that a beam was found to meet
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
     uint64_t exact_tests = 0;     // ... and that double precision left undecided
-    uint64_t tiles = 0;           // tiles for which an entry point was searched
-    uint64_t missed_tiles = 0;    // tiles that no leaf can hold a hit for
+    uint64_t tiles = 0;           // for which an entry point was searched
+    uint64_t missed_tiles = 0;    // that no leaf can hold a hit for
     uint64_t splits = 0;          // tiles that were split
     uint64_t fallbacks = 0;       // beams that say nothing, or were given up for packets
     uint64_t blockers = 0;        // triangles found to cover a tile's beam
+
+    // What all of it took, counted alike: visits of nodes and tests of triangles.
+    uint64_t work() const {
+        return entry_steps + traversal_steps + beam_steps + triangle_tests + beam_triangles;
+    }
 
     Counters &operator+=(const Counters &other) {
         rays += other.rays;

@@ -103,11 +103,11 @@ private:
     uint32_t waiting_count_ = 0;
     Mailbox mailbox_;
     std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
-    std::array<float, 6> cell_; // lower and upper bounds relative to the origin
+    std::array<float, 6> cell_;      // lower and upper bounds relative to the origin
     Vec3<PointPacket> side_normals_; // of the four sides of the beam, outward
     float side_slack_ = 0;
-    float least_ = 0;      // of all rays
-    float far_end_ = 0;    // no ray has anything to find beyond this depth
+    float least_ = 0;   // of all rays
+    float far_end_ = 0; // no ray has anything to find beyond this depth
 };
 
 // A slope in [lo, hi] crosses a plane at distance q at a depth in [q / hi, q / lo], if it
@@ -153,9 +153,8 @@ template <Query query>
 bool BeamLeafTracer<query>::beside() const {
     PointPacket innermost(-side_slack_);
     for (int axis = 0; axis < 3; ++axis)
-        innermost =
-            innermost + minimum(side_normals_[axis] * PointPacket(cell_[axis]),
-                                side_normals_[axis] * PointPacket(cell_[3 + axis]));
+        innermost = innermost + minimum(side_normals_[axis] * PointPacket(cell_[axis]),
+                                        side_normals_[axis] * PointPacket(cell_[3 + axis]));
     return any_lane(innermost > 0.0f);
 }
 
@@ -218,11 +217,8 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
             const float far_near = first > depths.near ? first : depths.near;
             if (enter_near) {
                 if (enter_far)
-                    stack[pending++] = {far_child,
-                                        {far_near, depths.far},
-                                        changed,
-                                        far_bound,
-                                        distance};
+                    stack[pending++] = {
+                        far_child, {far_near, depths.far}, changed, far_bound, distance};
                 node_index = node.lower_child() + above;
                 depths.far = last < depths.far ? last : depths.far;
                 change(above ? axis : axis + 3, distance);
@@ -271,7 +267,8 @@ void BeamLeafTracer<query>::test_leaf(KdNode leaf) {
             if (waiting_count_ == waiting_.size()) {
                 test_block(waiting_.data(), BLOCK_WIDTH);
                 waiting_count_ -= BLOCK_WIDTH;
-                std::copy_n(waiting_.begin() + BLOCK_WIDTH, waiting_count_, waiting_.begin());
+                std::copy_n(waiting_.begin() + BLOCK_WIDTH, waiting_count_,
+                            waiting_.begin());
             }
         } else if (waiting_count_ == BLOCK_WIDTH) {
             flush();
@@ -354,8 +351,8 @@ void BeamLeafTracer<query>::test_triangle(const TriangleForms &forms, uint32_t l
             covered = smallest > edge_error;
         }
     }
-    const FloatPacket highest =
-        fused(greatest, FloatPacket(forms.depth_grow[lane]), FloatPacket(forms.depth_error[lane]));
+    const FloatPacket highest = fused(greatest, FloatPacket(forms.depth_grow[lane]),
+                                      FloatPacket(forms.depth_error[lane]));
     packets &= to_bits(touched & (highest >= load<FloatPacket>(beam_.least)));
     const LaneBits covered_packets = to_bits(covered);
     bool changed = false;
@@ -393,8 +390,8 @@ bool BeamLeafTracer<query>::test_packet(BeamPacket &packet, const TriangleForms 
         return false;
     }
     const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
-    const LaneBits nearer = certain & to_bits((lowest > packet.greatest) &
-                                              (highest < packet.nearest));
+    const LaneBits nearer =
+        certain & to_bits((lowest > packet.greatest) & (highest < packet.nearest));
     if (nearer != 0) {
         const auto mask = from_bits<FloatPacket>(nearer);
         packet.found |= nearer;
@@ -403,8 +400,8 @@ bool BeamLeafTracer<query>::test_packet(BeamPacket &packet, const TriangleForms 
         } else {
             packet.least = select(mask, lowest, packet.least);
             packet.greatest = select(mask, highest, packet.greatest);
-            packet.primitive =
-                select(from_bits<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
+            packet.primitive = select(from_bits<UIntPacket>(nearer), UIntPacket(primitive),
+                                      packet.primitive);
         }
     }
     if ((possible & ~nearer) != 0)
@@ -415,8 +412,8 @@ bool BeamLeafTracer<query>::test_packet(BeamPacket &packet, const TriangleForms 
 
 // By the contract of geometry/triangle_test.h, ray by ray.
 template <Query query>
-void BeamLeafTracer<query>::decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
-                                   uint32_t primitive) {
+void BeamLeafTracer<query>::decide(BeamPacket &packet, LaneBits lanes,
+                                   LaneBits certain_hits, uint32_t primitive) {
     const Triangle &triangle = tree_.triangles[primitive];
     LaneArray<float> least = to_lanes<float>(packet.least);
     LaneArray<float> greatest = to_lanes<float>(packet.greatest);
@@ -447,9 +444,8 @@ void BeamLeafTracer<query>::decide(BeamPacket &packet, LaneBits lanes, LaneBits 
         best[lane] = primitive;
         // Of the distance, of the product, and of the reciprocal.
         const double depth = double(t) * std::abs(direction[beam_.axes[2]]);
-        least[lane] = query == Query::any
-                          ? INFINITE
-                          : float(std::min((1 - 0x1p-21) / depth, 0x1p126));
+        least[lane] = query == Query::any ? INFINITE
+                                          : float(std::min((1 - 0x1p-21) / depth, 0x1p126));
         greatest[lane] = float((1 + 0x1p-21) / depth);
     });
     packet.least = load<FloatPacket>(least);
@@ -494,33 +490,40 @@ template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
 
 FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
                           const BeamPacket &packet, Counters &counters) {
-    // Fewer lanes than this are faster one by one; chosen.
+    // Fewer lanes of a triangle than this are faster one by one; chosen.
     constexpr int FEW = 3;
+    Vec3<DoublePacket> direction;
+    for (int k = 0; k < 3; ++k)
+        direction[k] =
+            to_double(load_padded(rays.direction[k], packet.first_ray, rays.count));
+    const DoublePacket max_direction = maximum(
+        absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
     const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(packet.primitive);
-    LaneBits left = packet.found;
-    const uint32_t first = primitives[uint32_t(std::countr_zero(left))];
-    const LaneBits same = to_bits(packet.primitive == UIntPacket(first)) & left;
     FloatPacket t(INFINITE);
-    if (std::popcount(same) > FEW) {
-        const Triangle &triangle = tree.triangles[first];
+    LaneBits one_by_one = 0;
+    for (LaneBits left = packet.found; left != 0;) {
+        const uint32_t primitive = primitives[uint32_t(std::countr_zero(left))];
+        const LaneBits same = to_bits(packet.primitive == UIntPacket(primitive)) & left;
+        left &= ~same;
+        if (std::popcount(same) <= FEW) {
+            one_by_one |= same;
+            continue;
+        }
+        const Triangle &triangle = tree.triangles[primitive];
         const TrianglePlane plane(triangle);
-        Vec3<DoublePacket> direction;
-        for (int k = 0; k < 3; ++k)
-            direction[k] = to_double(
-                load_padded(rays.direction[k], packet.first_ray, rays.count));
-        const DoublePacket max_direction = maximum(
-            absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
         const Vec3d to_vertex = Vec3d(triangle.a) - Vec3d(rays.common_origin);
         const PlaneDistance<DoublePacket> distance(
             plane, PlaneNumerator<double>(plane, to_vertex), direction, max_direction);
-        t = distance.template rounded<FloatPacket>();
-        left &= ~(same & to_bits(distance.template certain<FloatPacket>()));
-        if (left == 0)
-            return t;
+        t = select(from_bits<FloatPacket>(same), distance.template rounded<FloatPacket>(),
+                   t);
+        const LaneBits open = same & ~to_bits(distance.template certain<FloatPacket>());
+        counters.exact_distances += uint64_t(std::popcount(open));
+        one_by_one |= open;
     }
+    if (one_by_one == 0)
+        return t;
     LaneArray<float> distances = to_lanes<float>(t);
-    for_each_lane(left, [&](uint32_t lane) {
-        counters.exact_distances += same >> lane & 1;
+    for_each_lane(one_by_one, [&](uint32_t lane) {
         distances[lane] =
             hit_distance(rays.common_origin, direction_of(rays, packet.first_ray + lane),
                          tree.triangles[primitives[lane]]);

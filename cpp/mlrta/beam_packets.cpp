@@ -15,12 +15,13 @@ namespace {
 constexpr float GREATEST_SLOPE = 2;
 
 // Directions whose main component lies outside lose digits or overflow on the way to
-// depths, and slopes that are smaller, but not zero, on the way to where planes are crossed.
+// depths, and slopes that are smaller, but not zero, on the way to where planes are
+// crossed.
 constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
 constexpr float SMALLEST_SLOPE = 0x1p-100f;
 
-// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those of
-// what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
+// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those
+// of what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
 constexpr float SMALLEST_DEPTH = 0x1p-120f;
 
@@ -75,14 +76,14 @@ void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
     packet.primitive = UIntPacket(NO_PRIMITIVE);
     packet.strays = 0;
     if (packet.active != finite)
-        packet.strays = finite & ~packet.active &
-                        to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
+        packet.strays =
+            finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
 
     const FloatPacket end = t_max * main;
     const FloatPacket before_end =
         maximum(end * (1 - WIDEN_DEPTH) - SMALLEST_DEPTH, FloatPacket(0.0f));
-    packet.least = masked(packet.active, 1.0f / (end * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH),
-                          INFINITE);
+    packet.least =
+        masked(packet.active, 1.0f / (end * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH), INFINITE);
     packet.greatest = 1.0f / before_end;
     const FloatPacket begin = t_min * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
     packet.nearest = (1 - WIDEN_DEPTH) / greatest_lane(masked(packet.active, begin, 0.0f));
@@ -135,9 +136,9 @@ void BeamPackets::turn_as_rays() {
 // Bounds of the slopes of each packet and of all, along the rectangle's sides.
 //
 // With r the greatest |p| or |q| relative to the first ray, the coordinates of a ray are
-// computed with an error of at most 6 roundings of 2 r, and cosine and sine have unit length
-// but for 4 roundings: 64 u r covers both, there and back. The center is rounded once more,
-// with an error of at most 4 u (|u| + |v|).
+// computed with an error of at most 6 roundings of 2 r, and cosine and sine have unit
+// length but for 4 roundings: 64 u r covers both, there and back. The center is rounded
+// once more, with an error of at most 4 u (|u| + |v|).
 void BeamPackets::fit_rectangle() {
     const float c = rectangle.cosine, s = rectangle.sine;
     const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
@@ -176,8 +177,10 @@ void BeamPackets::fit_rectangle() {
     const float size_u = std::max(std::abs(slope_lo[0]), std::abs(slope_hi[0]));
     const float size_v = std::max(std::abs(slope_lo[1]), std::abs(slope_hi[1]));
 
-    const FloatPacket p0 = mlrt::load<FloatPacket>(lo_p), p1 = mlrt::load<FloatPacket>(hi_p);
-    const FloatPacket q0 = mlrt::load<FloatPacket>(lo_q), q1 = mlrt::load<FloatPacket>(hi_q);
+    const FloatPacket p0 = mlrt::load<FloatPacket>(lo_p),
+                      p1 = mlrt::load<FloatPacket>(hi_p);
+    const FloatPacket q0 = mlrt::load<FloatPacket>(lo_q),
+                      q1 = mlrt::load<FloatPacket>(hi_q);
     const float beam_p0 = least_lane(p0), beam_p1 = greatest_lane(p1);
     const float beam_q0 = least_lane(q0), beam_q1 = greatest_lane(q1);
     const float mid_p = 0.5f * (beam_p0 + beam_p1), mid_q = 0.5f * (beam_q0 + beam_q1);
@@ -185,8 +188,9 @@ void BeamPackets::fit_rectangle() {
     rectangle.center_v += mid_p * s + mid_q * c;
     const float reach = std::max({-beam_p0, beam_p1, -beam_q0, beam_q1});
     const float slack = rectangle.slack =
-        FLOAT_ROUNDOFF * (64 * reach + 8 * (std::abs(rectangle.center_u) +
-                                            std::abs(rectangle.center_v) + size_u + size_v));
+        FLOAT_ROUNDOFF *
+        (64 * reach + 8 * (std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
+                           size_u + size_v));
     rectangle.half_p = 0.5f * (beam_p1 - beam_p0) + slack;
     rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
     greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +

@@ -1,11 +1,11 @@
 // The rays of a beam with a common origin, projected along the beam's main axis: what the
 // beam-leaf traversal tests triangles against.
 //
-// With k the main axis and i, j the two that follow it cyclically, the direction of a ray is
-// |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i / |d_k| and
-// v = d_j / |d_k|; side is the sign that all d_k share. What is linear in the direction is
-// |d_k| times something linear in (u, v), and so is one over the depth z = t |d_k| at which
-// a plane is met.
+// With k the main axis and i, j the two that follow it cyclically, the direction of a ray
+// is |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i / |d_k| and v = d_j
+// / |d_k|; side is the sign that all d_k share. What is linear in the direction is |d_k|
+// times something linear in (u, v), and so is one over the depth z = t |d_k| at which a
+// plane is met.
 #pragma once
 
 #include "base/simd.h"

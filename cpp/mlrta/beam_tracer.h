@@ -64,11 +64,15 @@ private:
         const uint32_t most = options_.traversal == Traversal::adaptive
                                   ? FREE_TRIANGLES + MOST_TRIANGLES_PER_RAY * active
                                   : std::numeric_limits<uint32_t>::max();
+        RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
         const bool done =
             trace_beam_leaf<Output::query>(tree_, rays_, frontier, most, beam, counters_);
         const float spent = float(counters_.beam_triangles - before) / float(active);
         experience_.triangles_per_ray += 0.5f * (spent - experience_.triangles_per_ray);
+        if (const float share = cost.share(active); share > 0)
+            for (uint32_t n = 0; n < beam.count; ++n)
+                cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
         if (!done) {
             ++counters_.fallbacks;
             counters_.rays -= active;
@@ -104,10 +108,12 @@ private:
         RegroupedRays along, strays;
         for (uint32_t n = 0; n < beam_.count; ++n) {
             const BeamPacket &packet = beam_.packets[n];
-            for_each_lane(packet.active,
-                          [&](uint32_t lane) { along.add(rays_, packet.first_ray + lane); });
-            for_each_lane(packet.strays,
-                          [&](uint32_t lane) { strays.add(rays_, packet.first_ray + lane); });
+            for_each_lane(packet.active, [&](uint32_t lane) {
+                along.add(rays_, packet.first_ray + lane);
+            });
+            for_each_lane(packet.strays, [&](uint32_t lane) {
+                strays.add(rays_, packet.first_ray + lane);
+            });
         }
         trace_regrouped(along, frontier, false);
         trace_regrouped(strays, frontier, false);
@@ -119,10 +125,9 @@ private:
         if (beam_.count == 1)
             return false;
         const Occupancy occupancy(beam_);
-        const std::optional<Occupancy::Cut> cut =
-            occupancy.best_cut(experience_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY
-                                   ? COSTLY_SHARE
-                                   : USUAL_SHARE);
+        const std::optional<Occupancy::Cut> cut = occupancy.best_cut(
+            experience_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
+                                                                     : USUAL_SHARE);
         if (!cut && (ordered || !occupancy.is_disordered(beam_)))
             return false;
         std::array<uint8_t, BeamPackets::MAX_RAYS> order;
@@ -137,8 +142,7 @@ private:
         return true;
     }
 
-    void trace_regrouped(const RegroupedRays &part, const Frontier &frontier,
-                         bool ordered) {
+    void trace_regrouped(RegroupedRays &part, const Frontier &frontier, bool ordered) {
         const RayGroup group = part.group(rays_);
         typename Output::Buffer buffer;
         Output output = buffer.output();
@@ -146,19 +150,23 @@ private:
         BeamTracer(tree_, group, options_, nullptr, output, counters_, experience_)
             .trace_beam(0, part.count, frontier, ordered);
         output_.set(part, buffer);
+        part.add_cost_to(rays_);
     }
 
     // Two parts of a beam are traced apart if the rectangles around them cover at most this
     // share of that of all: usually, and where beams meet so many triangles that smaller
-    // ones pay. Measured on office, conference, sponza, building and dragon: shares from 0.6
-    // to 0.9, limits from 0.12 to 0.5 triangles a ray.
+    // ones pay. Measured on office, conference, sponza, building and dragon: shares from
+    // 0.6 to 0.9, limits from 0.12 to 0.5 triangles a ray.
     static constexpr float USUAL_SHARE = 0.6f, COSTLY_SHARE = 0.9f;
     static constexpr float COSTLY_TRIANGLES_PER_RAY = 0.3f;
 
     // What a beam may test before it is given up for packets: rays that are far apart have
     // little in common. Dense scans take about four triangles a ray, where packets are
-    // slower still.
-    static constexpr uint32_t FREE_TRIANGLES = 64, MOST_TRIANGLES_PER_RAY = 12;
+    // slower still. What a beam has found is lost then, unless any hit will do. Chosen from
+    // 12 and no limit by the frames of conference and dragon.
+    static constexpr uint32_t FREE_TRIANGLES = 64;
+    static constexpr uint32_t MOST_TRIANGLES_PER_RAY =
+        Output::query == Query::any ? 24 : 96;
 
     const KdTree &tree_;
     const RayGroup &rays_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mlrta/frontier.h"
+#include "mlrta/ray_cost.h"
 #include "mlrta/trace.h"
 #include "mlrta/trace_output.h"
 #include "traverse/brute_force.h"
@@ -46,9 +47,15 @@ public:
         }
         counters_.rays += uint64_t(std::popcount(packet.active | extreme));
         counters_.packets += (packet.active | extreme) != 0;
-        if (packet.active != 0)
+        RayCost cost(rays_, counters_);
+        if (packet.active != 0) {
             trace_packet(packet, first, frontier);
-        for_each_lane(extreme, [&](uint32_t lane) { trace_ray(first + lane, frontier); });
+            cost.add_to_lanes(first, packet.active);
+        }
+        for_each_lane(extreme, [&](uint32_t lane) {
+            trace_ray(first + lane, frontier);
+            cost.add_to_lanes(first, 1u << lane);
+        });
     }
 
 private:

@@ -1,5 +1,6 @@
 #include "mlrta/regroup.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace mlrt {
@@ -85,7 +86,8 @@ bool Occupancy::is_disordered(const BeamPackets &beam) const {
         if (beam.packets[n].active != 0)
             area += half_p[n] * half_q[n];
     const SlopeRectangle &r = beam.rectangle;
-    return area > DISORDER * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);
+    return area >
+           DISORDER * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);
 }
 
 uint32_t Occupancy::sorted(const BeamPackets &beam,
@@ -118,14 +120,24 @@ void RegroupedRays::add(const RayGroup &rays, uint32_t ray) {
     number[count++] = ray;
 }
 
-RayGroup RegroupedRays::group(const RayGroup &from) const {
+RayGroup RegroupedRays::group(const RayGroup &from) {
     RayGroup group = from;
     group.count = count;
     for (int k = 0; k < 3; ++k)
         group.direction[k] = direction[k].data();
     group.t_min = t_min.data();
     group.t_max = t_max.data();
+    if (from.cost) {
+        std::fill_n(cost.begin(), count, 0.0f);
+        group.cost = cost.data();
+    }
     return group;
+}
+
+void RegroupedRays::add_cost_to(const RayGroup &from) const {
+    if (from.cost)
+        for (uint32_t i = 0; i < count; ++i)
+            from.cost[number[i]] += cost[i];
 }
 
 } // namespace mlrt

@@ -18,8 +18,8 @@ public:
 
     explicit Occupancy(const BeamPackets &beam);
 
-    // A line across the rectangle: rays with less than `cell` cells along the axis (0 for p,
-    // 1 for q) lie on one side of it, the others on the other.
+    // A line across the rectangle: rays with less than `cell` cells along the axis (0 for
+    // p, 1 for q) lie on one side of it, the others on the other.
     struct Cut {
         int axis, cell;
     };
@@ -48,13 +48,17 @@ private:
 struct RegroupedRays {
     std::array<std::array<float, BeamPackets::MAX_RAYS>, 3> direction;
     std::array<float, BeamPackets::MAX_RAYS> t_min, t_max;
+    std::array<float, BeamPackets::MAX_RAYS> cost;
     std::array<uint32_t, BeamPackets::MAX_RAYS> number;
     uint32_t count = 0;
 
     void add(const RayGroup &rays, uint32_t ray);
 
     // They alone, with the origin of the group that they are from.
-    RayGroup group(const RayGroup &from) const;
+    RayGroup group(const RayGroup &from);
+
+    // What they took, if the group that they are from keeps account of it.
+    void add_cost_to(const RayGroup &from) const;
 };
 
 } // namespace mlrt

@@ -3,6 +3,7 @@
 #include "mlrta/beam_tracer.h"
 #include "mlrta/frontier.h"
 #include "mlrta/packet_tracer.h"
+#include "mlrta/ray_cost.h"
 #include "mlrta/tile.h"
 
 #include <algorithm>
@@ -46,6 +47,7 @@ private:
     // get any deeper. A packet is never split. No ray has a first hit beyond t_end.
     void trace_tile(uint32_t first, uint32_t count, const Frontier &parent, double t_end) {
         ++counters_.tiles;
+        RayCost cost(rays_, counters_);
         Beam beam;
         if (tile_ == nullptr ||
             !tile_beam(*tile_, first, count, greatest_t_min_, greatest_t_max_, beam))
@@ -56,12 +58,12 @@ private:
         const Frontier frontier =
             search_frontier({tree_.nodes.data(), tree_.nodes.capacity()}, parent,
                             most_entries_, judge, options_.search_order);
+        cost.add_to_run(first, count);
         if (frontier.count == 0) {
             ++counters_.missed_tiles;
             return;
         }
-        const uint32_t minimum =
-            std::max(minimum_tile_ * minimum_tile_, PACKET_WIDTH);
+        const uint32_t minimum = std::max(minimum_tile_ * minimum_tile_, PACKET_WIDTH);
         if (count <= minimum ||
             (frontier.count == 1 && tree_.node(frontier.entries[0].node).is_leaf())) {
             runs_.trace(first, count, frontier);
@@ -102,14 +104,16 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &o
     };
     output.clear(rays.count);
     if (!rays.has_common_origin) {
-        trace_runs(PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
+        trace_runs(
+            PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
     } else if (options.traversal == Traversal::beam_leaf ||
                options.traversal == Traversal::adaptive) {
         BeamExperience experience;
         trace_runs(BeamTracer<Output>(tree, rays, options, tile ? &tile->camera : nullptr,
                                       output, counters, experience));
     } else {
-        trace_runs(PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));
+        trace_runs(
+            PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));
     }
 }
 

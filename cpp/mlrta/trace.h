@@ -42,10 +42,10 @@ enum class Culling : uint32_t {
 // one entry point for beams.
 struct TraceOptions {
     Traversal traversal = Traversal::adaptive;
-    bool entry_points = true;    // MLRTA: search an entry point for each tile
-    uint32_t initial_tile = 64;  // ITS: rays along the side of a tile
-    uint32_t minimum_tile = 0;   // MTS: tiles of at most this size are traced; 0: usual
-    uint32_t split_factor = 4;   // SF: children of a tile that is split, 4 or 16
+    bool entry_points = true;   // MLRTA: search an entry point for each tile
+    uint32_t initial_tile = 64; // ITS: rays along the side of a tile
+    uint32_t minimum_tile = 0;  // MTS: tiles of at most this size are traced; 0: usual
+    uint32_t split_factor = 4;  // SF: children of a tile that is split, 4 or 16
     LeafRejection leaf_rejection = LeafRejection::slopes;
     Culling culling = Culling::inverse_frustum;
     SearchOrder search_order = SearchOrder::shallow_first; // [E1, E2]

@@ -18,19 +18,19 @@ constexpr float UNDERFLOW = 0x1p-146f;
 // Bounds on errors, in units of roundoff.
 //
 // Edges: let s be the largest component of a vertex relative to the origin, e that of an
-// edge, and S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge once,
-// so that each product of a normal's component has three roundings and their difference a
-// fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes have two
-// roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over a
-// rectangle two roundings lead to the form's value at the center, three to its change along
-// a side, and five to the sum of all: 16 in a row. That is 32 s e S; 40 covers products of
-// roundings and the bound itself.
+// edge, and S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge
+// once, so that each product of a normal's component has three roundings and their
+// difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
+// have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
+// a rectangle two roundings lead to the form's value at the center, three to its change
+// along a side, and five to the sum of all: 16 in a row. That is 32 s e S; 40 covers
+// products of roundings and the bound itself.
 constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
 // Depth: N comes from double precision, where thin triangles keep its digits. With n its
 // largest component, 12 roundings of at most n S are left, and that of the bound.
 constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
-// The volume a.N in double: N has a difference, a product and another difference, the rest a
-// difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2.
+// The volume a.N in double: N has a difference, a product and another difference, the rest
+// a difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2.
 constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
 // What is certain of the volume: that no more than this share of it is error.
 constexpr float LARGEST_SHARE = 0.25f;
@@ -68,7 +68,9 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const Vec3<DoubleBlock> da = to_double(va);
     const Vec3<DoubleBlock> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
     const Vec3<FloatBlock> normals[4] = {
-        cross(b, bc), cross(c, ca), cross(a, ab),
+        cross(b, bc),
+        cross(c, ca),
+        cross(a, ab),
         {FloatBlock(d_normal.x), FloatBlock(d_normal.y), FloatBlock(d_normal.z)}};
     const FloatBlock volume(dot(da - to_double(o), d_normal));
 
@@ -76,9 +78,8 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
         maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
     const FloatBlock edge = maximum(largest_component(ab),
                                     maximum(largest_component(bc), largest_component(ca)));
-    const FloatBlock volume_error =
-        float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
-        (2 * FLOAT_ROUNDOFF) * absolute(volume);
+    const FloatBlock volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
+                                    (2 * FLOAT_ROUNDOFF) * absolute(volume);
     const FloatBlock inverse = 1.0f / volume;
     const FloatBlock inverse_size = absolute(inverse);
     const FloatBlock share = volume_error * inverse_size;
@@ -105,9 +106,9 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const FloatBlock half_p(rectangle.half_p), half_q(rectangle.half_q);
     MaskOf<FloatBlock> inside = safe;
 
-    // Where the vertices lie in the rectangle. A slope has four roundings, a difference, two
-    // products and a sum follow, and the middle and extent of all: less than 16 of at most
-    // the greatest coordinate and S.
+    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
+    // two products and a sum follow, and the middle and extent of all: less than 16 of at
+    // most the greatest coordinate and S.
     FloatBlock lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
     for (const Vec3<FloatBlock> *vertex_seen : {&a, &b, &c}) {
         const FloatBlock reciprocal = 1.0f / (vertex_seen->z * beam.side);
@@ -148,8 +149,7 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
         const FloatBlock middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
         const FloatBlock form_p = fused(form_u, cosine, form_v * sine);
         const FloatBlock form_q = fused(form_v, cosine, -(form_u * sine));
-        greatest =
-            middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
+        greatest = middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
         if (form != DEPTH)
             inside &= greatest >= -edge_bound;
         store(constant[form], form_1);
@@ -159,9 +159,9 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
         store(of_p[form], form_p);
         store(of_q[form], form_q);
     }
-    // With the exact value y and the computed one x = y (1 + r) + f, |r| <= share <= 1/4 and
-    // |f| <= depth_bound: y is at most (x + f) (1 + 2 share) and at least
-    // (x - f) (1 - share), for x of either sign as far as y is positive.
+    // With the exact value y and the computed one x = y (1 + r) + f, |r| <= share <= 1/4
+    // and |f| <= depth_bound: y is at most (x + f) (1 + 2 share) and at least (x - f) (1 -
+    // share), for x of either sign as far as y is positive.
     const FloatBlock grow = 1.0f + 2.0f * share, shrink = 1.0f - 2.0f * share;
     const FloatBlock error = 2.0f * depth_bound;
     store(depth_grow, grow * (1 + 4 * FLOAT_ROUNDOFF));

@@ -31,6 +31,11 @@ struct RayGroup {
     const float *direction[3]{};
     const float *t_min = nullptr;
     const float *t_max = nullptr;
+
+    // If given, what tracing takes is added here for each ray: nodes that are visited and
+    // triangles that are tested, shared equally by rays for which that is done together. It
+    // depends on how rays are grouped.
+    float *cost = nullptr;
 };
 
 // Nearest hits: t and the number of the triangle, or infinity and NO_PRIMITIVE.
