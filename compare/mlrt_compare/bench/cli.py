@@ -104,6 +104,16 @@ def make_parser() -> Parser:
     frames.set_defaults(run=run_frames)
     add_shared_options(frames, repeats=7, scenes="office,conference")
     add_sample_counts(frames)
+    tiles = commands.add_parser(
+        "tiles",
+        help="frames with tiles of other sizes",
+        description="Traces the frame of `rays` with MLRT, over the paper's range of ITS, "
+        "MTS and split factors, and sets the time beside that with the usual tiles. On one "
+        "thread, whatever --threads says.",
+    )
+    tiles.set_defaults(run=run_tiles)
+    add_shared_options(tiles, repeats=5)
+    add_sample_counts(tiles)
     return parser
 
 
@@ -122,6 +132,12 @@ def run_build(options: argparse.Namespace) -> bool:
 
 def run_rays(options: argparse.Namespace) -> bool:
     from .rays_command import run
+
+    return run(options)
+
+
+def run_tiles(options: argparse.Namespace) -> bool:
+    from .tiles_command import run
 
     return run(options)
 
