@@ -22,7 +22,7 @@ from .errors import OutputError
 
 FORMATS = (".exr", ".png")
 CHANNELS = {"depth": ("depth.T",), "normal": ("normal.X", "normal.Y", "normal.Z")}
-CHANNELS["prim"] = ("prim.I",)
+CHANNELS |= {"prim": ("prim.I",), "cost": ("cost.Y",)}
 
 
 def check_output(path: Path, aovs: tuple[str, ...] = ()) -> None:

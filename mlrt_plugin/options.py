@@ -44,7 +44,7 @@ INTEGRATOR_OPTIONS = (
 """Those that the integrator `mlrt` takes as parameters: by ``max_depth`` Mitsuba's
 integrators mean the length of paths."""
 
-AOVS = ("depth", "normal", "prim")
+AOVS = ("depth", "normal", "prim", "cost")
 """Images that can be had beside the colours."""
 
 

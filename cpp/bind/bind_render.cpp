@@ -26,7 +26,9 @@ options: fields of TraceOptions (mlrta/trace.h), names of enumerators as str; th
 change the picture.
 aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
 'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
-'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss).
+'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss); 'cost' (float32
+(H, W), nodes visited and triangles tested for a sample's camera and shadow ray, the mean of
+the pixel's samples, where rays that are traced together share alike) tells of the options.
 progress: called as progress(done), done from 0 to 1, on the calling thread and at most
 about ten times a second.
 
@@ -43,8 +45,11 @@ AovSet aovs_from(const std::vector<std::string> &names) {
             aovs.normal = true;
         else if (name == "prim")
             aovs.primitive = true;
+        else if (name == "cost")
+            aovs.cost = true;
         else
-            refuse_value("aovs must be among: depth, normal, prim; not '" + name + "'.");
+            refuse_value("aovs must be among: depth, normal, prim, cost; not '" + name +
+                         "'.");
     }
     return aovs;
 }
@@ -83,6 +88,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
         pictures["normal"] = to_numpy<float>(std::move(result.normal), {height, width, 3});
     if (settings.aovs.primitive)
         pictures["prim"] = to_numpy<int32_t>(std::move(result.primitive), {height, width});
+    if (settings.aovs.cost)
+        pictures["cost"] = to_numpy<float>(std::move(result.cost), {height, width});
     nb::dict counters;
     counters.update(counters_to_dict(result.counters.primary, "primary_"));
     counters.update(counters_to_dict(result.counters.shadow, "shadow_"));

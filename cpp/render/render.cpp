@@ -48,8 +48,10 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     result.depth.resize(settings.aovs.depth ? pixel_count : 0);
     result.normal.resize(settings.aovs.normal ? 3 * pixel_count : 0);
     result.primitive.resize(settings.aovs.primitive ? pixel_count : 0);
+    result.cost.resize(settings.aovs.cost ? pixel_count : 0);
     const TileTarget target{blocks, channels,
-                            settings.aovs.primitive ? result.primitive.data() : nullptr};
+                            settings.aovs.primitive ? result.primitive.data() : nullptr,
+                            settings.aovs.cost ? result.cost.data() : nullptr};
 
     const double all_samples =
         double(sampled.width) * sampled.height * settings.samples_per_pixel;

@@ -24,13 +24,15 @@ struct RenderResult {
     std::vector<float> depth;  // distance from the near plane along the ray; 0 for a miss
     std::vector<float> normal; // shading normal, three a pixel; 0 for a miss
     std::vector<int32_t>
-        primitive; // face that each pixel's first sample hit; -1 for a miss
+        primitive;           // face that each pixel's first sample hit; -1 for a miss
+    std::vector<float> cost; // of a sample, see RayGroup: primary and shadow rays, mean
     RenderCounters counters;
 };
 
 // Depth and normal are filtered as the colours are, as in Mitsuba's `aov` integrator.
 //
-// The result depends, bit for bit, on the scene, the number of samples and the seed only.
+// The result, but for the cost, depends, bit for bit, on the scene, the number of samples
+// and the seed only.
 //
 // `cancelled`, if given, is asked now and then by the calling thread, with the share of the
 // work that is done; once it returns true the function returns false and the result is of

@@ -58,7 +58,8 @@ private:
 class SampleStreams {
 public:
     SampleStreams(uint32_t seed, uint32_t pixel_count, uint32_t samples_per_pixel)
-        : seed_(seed), samples_per_pass_(samples_per_pixel) {
+        : seed_(seed), samples_per_pixel_(samples_per_pixel),
+          samples_per_pass_(samples_per_pixel) {
         const uint64_t limit = 0xffffffffu;
         const uint64_t total = uint64_t(pixel_count) * samples_per_pixel;
         if (total > limit) {
@@ -68,6 +69,8 @@ public:
                 samples_per_pass_ = 1;
         }
     }
+
+    uint32_t samples_per_pixel() const { return samples_per_pixel_; }
 
     struct Stream {
         uint32_t seed, index;
@@ -102,7 +105,7 @@ public:
 
 private:
     uint32_t seed_;
-    uint32_t samples_per_pass_;
+    uint32_t samples_per_pixel_, samples_per_pass_;
 };
 
 // The first two pairs of numbers of each stream: where in its pixel a sample lies, and

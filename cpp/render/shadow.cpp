@@ -50,8 +50,15 @@ void ShadowTracer::sort_by_emitter(const ShadowCandidates &candidates) {
         order_[next_[candidates.emitter[i]]++] = i;
 }
 
+void ShadowTracer::add_costs_to(const ShadowCandidates &candidates,
+                                float *of_camera_rays) const {
+    for (uint32_t i = 0; i < candidates.count; ++i)
+        of_camera_rays[candidates.ray[order_[i]]] += costs_[i];
+}
+
 void ShadowTracer::trace_group(const ShadowCandidates &candidates,
-                               std::span<const uint32_t> group, const Emitter &emitter) {
+                               std::span<const uint32_t> group, const Emitter &emitter,
+                               float *costs) {
     const size_t count = group.size();
     const bool from_light =
         emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
@@ -80,6 +87,7 @@ void ShadowTracer::trace_group(const ShadowCandidates &candidates,
     }
     rays.t_min = t_min_.data();
     rays.t_max = t_max_.data();
+    rays.cost = costs;
     trace_any(*scene_.data.tree, rays, options_, occluded_.data(), counters_);
 }
 

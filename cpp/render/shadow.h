@@ -46,13 +46,16 @@ public:
     template <typename Visible>
     void trace(const ShadowCandidates &candidates, Visible &&visible) {
         sort_by_emitter(candidates);
+        if (keep_costs_)
+            costs_.assign(candidates.count, 0.0f);
         for (uint32_t begin = 0; begin < candidates.count;) {
             const uint32_t emitter = candidates.emitter[order_[begin]];
             uint32_t end = begin;
             while (end < candidates.count && candidates.emitter[order_[end]] == emitter)
                 ++end;
             const std::span<const uint32_t> group(order_.data() + begin, end - begin);
-            trace_group(candidates, group, scene_.data.emitters[emitter]);
+            trace_group(candidates, group, scene_.data.emitters[emitter],
+                        keep_costs_ ? costs_.data() + begin : nullptr);
             for (size_t i = 0; i < group.size(); ++i)
                 if (!occluded_[i])
                     visible(group[i]);
@@ -60,10 +63,15 @@ public:
         }
     }
 
+    // Whether trace() is to keep account of what each ray takes, and adding that to the
+    // camera rays' own.
+    void keep_costs(bool keep) { keep_costs_ = keep; }
+    void add_costs_to(const ShadowCandidates &candidates, float *of_camera_rays) const;
+
 private:
     void sort_by_emitter(const ShadowCandidates &candidates);
     void trace_group(const ShadowCandidates &candidates, std::span<const uint32_t> group,
-                     const Emitter &emitter);
+                     const Emitter &emitter, float *costs);
 
     const PreparedScene &scene_;
     const TraceOptions &options_;
@@ -72,6 +80,8 @@ private:
     std::vector<uint32_t> next_;  // of each emitter: the next free place in order_
     std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
     std::vector<uint8_t> occluded_;
+    bool keep_costs_ = false;
+    std::vector<float> costs_; // in the order of order_
 };
 
 } // namespace mlrt

@@ -63,15 +63,20 @@ void TileRenderer::Rays::resize(size_t new_count, size_t channels) {
 void TileRenderer::render(const PixelGroup &group) {
     rays_.resize(group.pixels.size() * group.sample_count, target_.channels.count);
     candidates_.reset(rays_.count);
+    if (target_.cost)
+        rays_.cost.assign(rays_.count, 0.0f);
     generate(group);
     trace_camera_rays(group);
     shade_hits();
     pass_hidden_emitters();
+    shadow_tracer_.keep_costs(target_.cost != nullptr);
     shadow_tracer_.trace(candidates_, [&](uint32_t i) {
         const uint32_t ray = candidates_.ray[i];
         for (int k = 0; k < 3; ++k)
             rays_.values[k][ray] += candidates_.contribution[k][i];
     });
+    if (target_.cost)
+        shadow_tracer_.add_costs_to(candidates_, rays_.cost.data());
     write(group);
 }
 
@@ -122,6 +127,7 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
         rays.direction[k] = rays_.direction[k].data();
     rays.t_min = rays_.t_min.data();
     rays.t_max = rays_.t_max.data();
+    rays.cost = target_.cost ? rays_.cost.data() : nullptr;
 
     const PixelRect &sampled = target_.blocks.sampled();
     const int x = sampled.x + int(group.pixels[0].column);
@@ -314,6 +320,11 @@ void TileRenderer::write(const PixelGroup &group) {
             row < film.crop_height)
             target_.primitive[size_t(row) * film.crop_width + column] =
                 int32_t(rays_.primitive[ray]);
+        if (target_.cost && column < film.crop_width && row < film.crop_height) {
+            float &cost = target_.cost[size_t(row) * film.crop_width + column];
+            for (uint32_t i = 0; i < group.sample_count; ++i)
+                cost += rays_.cost[ray + i] / float(streams_.samples_per_pixel());
+        }
         for (uint32_t k = 0; k < target_.channels.count; ++k)
             values[k] = &rays_.values[k][ray];
         target_.blocks.add(pixel.column, pixel.row, group.sample_count, &rays_.film_x[ray],

@@ -20,6 +20,7 @@ struct AovSet {
     bool depth = false;
     bool normal = false;
     bool primitive = false;
+    bool cost = false;
 };
 
 // Where each channel of the film lies; -1 if there is none.
@@ -42,7 +43,8 @@ struct TileTarget {
     FilmBlocks &blocks;
     FilmChannels channels;
     int32_t *primitive =
-        nullptr; // of each pixel's first sample, if wanted: crop, row by row
+        nullptr;           // of each pixel's first sample, if wanted: crop, row by row
+    float *cost = nullptr; // of a sample of each pixel, if wanted: the same
 };
 
 struct RenderCounters {
@@ -85,6 +87,7 @@ private:
         std::vector<float> direction[3], t_min, t_max;
         std::vector<float> t;
         std::vector<uint32_t> primitive;
+        std::vector<float> cost;                // if it is wanted
         std::vector<std::vector<float>> values; // by channel of the film
 
         void resize(size_t new_count, size_t channels);

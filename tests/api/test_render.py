@@ -253,3 +253,27 @@ def test_prepared_scene_is_rendered_again(scene_file: SceneFile) -> None:
         prepared.render(max_depth=3)
     with pytest.raises(TypeError, match="'traversal'"):
         mlrt_plugin.prepare(path, traversal="single")
+
+
+def test_cost_tells_where_the_work_is(scene_file: SceneFile) -> None:
+    """What counters count in all is what the picture holds, and none of it moves light."""
+    path = scene_file()
+    for options in ({}, {"traversal": "packet"}, {"traversal": "single"}):
+        plain = render(path, spp=2, **options)
+        result = render(path, spp=2, aovs=("cost",), **options)
+        assert np.array_equal(result.image, plain.image)
+        work = sum(
+            result.counters[ray + name]
+            for ray in ("primary_", "shadow_")
+            for name in (
+                "entry_steps",
+                "traversal_steps",
+                "beam_steps",
+                "triangle_tests",
+                "beam_triangles",
+            )
+        )
+        cost = result.aovs["cost"]
+        assert cost.shape == result.image.shape[:2]
+        assert (cost >= 0).all() and cost.any()
+        assert cost.sum() * 2 == pytest.approx(work, rel=1e-4)

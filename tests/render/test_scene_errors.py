@@ -158,7 +158,11 @@ BAD_RENDERS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
         ValueError,
         "brute_force, single",
     ),
-    "tiles": ({"options": {"initial_tile": 4}}, ValueError, "must not exceed"),
+    "tiles": (
+        {"options": {"initial_tile": 16, "minimum_tile": 32}},
+        ValueError,
+        "must not exceed",
+    ),
     "no tile": ({"options": {"minimum_tile": 0}}, ValueError, "positive"),
     "split": ({"options": {"split_factor": 5}}, ValueError, "4 or 16"),
     "unknown picture": ({"aovs": ["albedo"]}, ValueError, "'albedo'"),
