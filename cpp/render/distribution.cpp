@@ -31,4 +31,24 @@ Distribution::Choice Distribution::choose(float random) const {
     return {index, (random - before) / probability, probability};
 }
 
+// The first entry that is not less than the target is as many behind the first as are less:
+// where one is, the next takes its place.
+Distribution::Choices Distribution::choose(const FloatPacket &random) const {
+    const FloatPacket target = random * sum_;
+    const auto before = [&](uint32_t i) {
+        return FloatPacket(i > 0 ? cumulative_[i - 1] * normalization_ : 0.0f);
+    };
+    UIntPacket index(first_);
+    FloatPacket probability(weights_[first_] * normalization_), start = before(first_);
+    for (uint32_t i = first_; i < last_; ++i) {
+        const LaneBits less = to_bits(FloatPacket(cumulative_[i]) < target);
+        const auto beyond = from_bits<FloatPacket>(less);
+        index = select(from_bits<UIntPacket>(less), UIntPacket(i + 1), index);
+        probability =
+            select(beyond, FloatPacket(weights_[i + 1] * normalization_), probability);
+        start = select(beyond, before(i + 1), start);
+    }
+    return {index, (random - start) / probability, probability};
+}
+
 } // namespace mlrt

@@ -1,6 +1,8 @@
 // A choice among finitely many things with given weights.
 #pragma once
 
+#include "base/simd.h"
+
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -26,6 +28,15 @@ public:
 
     // Needs a positive sum of weights. `random` is in [0, 1).
     Choice choose(float random) const;
+
+    // The same for sixteen numbers at once, by comparing with all entries: for few of them.
+    struct Choices {
+        UIntPacket index;
+        FloatPacket reused, probability;
+    };
+    Choices choose(const FloatPacket &random) const;
+
+    size_t size() const { return weights_.size(); }
 
 private:
     std::vector<float> weights_;

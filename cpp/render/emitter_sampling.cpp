@@ -29,6 +29,39 @@ OneChoice choose_emitter(const PreparedScene &scene, float x) {
     return {index, float(count), scaled - float(index)};
 }
 
+struct Choices {
+    UIntPacket emitter;
+    FloatPacket weight, reused;
+};
+
+// The same for sixteen numbers.
+Choices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
+    constexpr size_t FEW = 16; // compared with all; chosen
+    const uint32_t count = uint32_t(scene.data.emitters.size());
+    if (scene.emitter_choice.empty()) {
+        const FloatPacket scaled = x * FloatPacket(float(count));
+        // Truncated, as conversion to an integer does; x < 1 may round up to the count.
+        const FloatPacket index =
+            minimum(FloatPacket(UIntPacket(scaled)), FloatPacket(float(count - 1)));
+        return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
+    }
+    if (scene.emitter_choice.size() <= FEW) {
+        const Distribution::Choices choices = scene.emitter_choice.choose(x);
+        return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
+    }
+    const LaneArray<float> random = to_lanes<float>(x);
+    LaneArray<uint32_t> emitter;
+    LaneArray<float> weight, reused;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const OneChoice choice = choose_emitter(scene, random[lane]);
+        emitter[lane] = choice.emitter;
+        weight[lane] = choice.weight;
+        reused[lane] = choice.reused;
+    }
+    return {load<UIntPacket>(emitter), load<FloatPacket>(weight),
+            load<FloatPacket>(reused)};
+}
+
 template <typename Real>
 struct AreaPoint {
     Vec3<Real> p;
@@ -190,22 +223,16 @@ EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket
             sample_one(scene, 0, FloatPacket(1.0f), p, x, y);
         return samples;
     }
-    const LaneArray<float> random = to_lanes<float>(x);
-    LaneArray<float> weight, reused;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const OneChoice choice = choose_emitter(scene, random[lane]);
-        samples.emitter[lane] = choice.emitter;
-        weight[lane] = choice.weight;
-        reused[lane] = choice.reused;
-    }
+    const Choices choices = choose_emitters(scene, x);
     // Lanes that chose the same emitter are served together.
-    const UIntPacket emitters = load<UIntPacket>(samples.emitter);
+    const UIntPacket emitters = choices.emitter;
+    samples.emitter = to_lanes<uint32_t>(emitters);
     samples.weight = samples.direction = samples.target = spread<FloatPacket>({});
     while (lanes != 0) {
         const uint32_t emitter = samples.emitter[uint32_t(std::countr_zero(lanes))];
         const LaneBits served = to_bits(emitters == UIntPacket(emitter));
-        const EmitterSample<FloatPacket> part = sample_one(
-            scene, emitter, load<FloatPacket>(weight), p, load<FloatPacket>(reused), y);
+        const EmitterSample<FloatPacket> part =
+            sample_one(scene, emitter, choices.weight, p, choices.reused, y);
         const MaskOf<FloatPacket> mask = from_bits<FloatPacket>(served);
         for (int k = 0; k < 3; ++k) {
             samples.weight[k] = select(mask, part.weight[k], samples.weight[k]);
