@@ -3,6 +3,7 @@
 
 NB_MODULE(MLRT_MODULE, m) {
     m.attr("isa") = MLRT_ISA_NAME;
+    mlrt::bind_beam_leaf_selftest(m);
     mlrt::bind_kdtree_selftest(m);
     mlrt::bind_mlrta_selftest(m);
     mlrt::bind_numerics(m);

@@ -1,0 +1,147 @@
+// What the tests ask of the parts of the beam-leaf traversal.
+#include "bind/bind.h"
+#include "mlrta/ray_grid.h"
+#include "mlrta/regroup.h"
+#include "mlrta/triangle_forms.h"
+
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/vector.h>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+using Rows = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
+
+// A beam and the rays that it is made of.
+class BeamUnderTest {
+public:
+    BeamUnderTest(const std::array<float, 3> &origin, const Rows &directions) {
+        count_ = uint32_t(directions.shape(0));
+        t_min_.assign(count_, 0.0f);
+        t_max_.assign(count_, INFINITY);
+        for (int k = 0; k < 3; ++k) {
+            for (uint32_t i = 0; i < count_; ++i)
+                direction_[k].push_back(directions(i, size_t(k)));
+            group_.direction[k] = direction_[k].data();
+        }
+        group_.count = count_;
+        group_.has_common_origin = true;
+        group_.common_origin = {origin[0], origin[1], origin[2]};
+        group_.t_min = t_min_.data();
+        group_.t_max = t_max_.data();
+        const KeepDenormals keep;
+        beam.load(group_, 0, count_, nullptr);
+    }
+
+    BeamPackets beam;
+
+private:
+    uint32_t count_;
+    std::vector<float> direction_[3], t_min_, t_max_;
+    RayGroup group_;
+};
+
+nb::dict describe(const BeamUnderTest &self) {
+    const BeamPackets &beam = self.beam;
+    const SlopeRectangle &r = beam.rectangle;
+    const LaneArray<float> center_p = to_lanes<float>(beam.center_p);
+    const LaneArray<float> center_q = to_lanes<float>(beam.center_q);
+    const LaneArray<float> half_p = to_lanes<float>(beam.half_p);
+    const LaneArray<float> half_q = to_lanes<float>(beam.half_q);
+    nb::list packets;
+    for (uint32_t n = 0; n < beam.count; ++n) {
+        const BeamPacket &packet = beam.packets[n];
+        nb::dict one;
+        one["active"] = packet.active;
+        one["strays"] = packet.strays;
+        one["box"] = std::array{center_p[n], center_q[n], half_p[n], half_q[n]};
+        packets.append(one);
+    }
+    nb::dict dict;
+    dict["axes"] = beam.axes;
+    dict["side"] = beam.side;
+    dict["rectangle"] =
+        std::array{r.center_u, r.center_v, r.cosine, r.sine, r.half_p, r.half_q};
+    dict["packets"] = packets;
+    return dict;
+}
+
+std::vector<float> lanes_of(const TriangleForms::Lanes &lanes) {
+    return {lanes, lanes + TriangleForms::CAPACITY};
+}
+
+// Of up to eight triangles, given by their vertices one after the other.
+nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
+    std::vector<Triangle> triangles;
+    for (size_t i = 0; i + 2 < vertices.shape(0); i += 3) {
+        Triangle triangle;
+        for (size_t k = 0; k < 3; ++k) {
+            triangle.a[int(k)] = vertices(i, k);
+            triangle.b[int(k)] = vertices(i + 1, k);
+            triangle.c[int(k)] = vertices(i + 2, k);
+        }
+        triangles.push_back(triangle);
+    }
+    std::array<uint32_t, TriangleForms::CAPACITY> numbers{};
+    for (uint32_t n = 0; n < triangles.size(); ++n)
+        numbers[n] = n;
+    TriangleForms forms;
+    {
+        const KeepDenormals keep;
+        forms.set(self.beam, 0, triangles.data(), numbers.data(),
+                  uint32_t(triangles.size()));
+    }
+    nb::dict dict;
+    dict["possible"] = forms.possible;
+    dict["unsafe"] = forms.unsafe;
+    nb::list values;
+    for (int form = 0; form < 4; ++form)
+        values.append(nb::make_tuple(lanes_of(forms.constant[form]),
+                                     lanes_of(forms.of_u[form]),
+                                     lanes_of(forms.of_v[form])));
+    dict["forms"] = values;
+    dict["edge_error"] = lanes_of(forms.edge_error);
+    dict["depth_error"] = lanes_of(forms.depth_error);
+    dict["depth_shrink"] = lanes_of(forms.depth_shrink);
+    dict["depth_grow"] = lanes_of(forms.depth_grow);
+    return dict;
+}
+
+bool grid_may_hit(const BeamUnderTest &self, float p, float q, float half_p, float half_q) {
+    RayGrid grid;
+    grid.fill(self.beam);
+    return grid.may_hit(p, q, half_p, half_q);
+}
+
+// Rays in the order of their cells, and for each whether it lies beyond the best cut.
+std::vector<std::pair<uint32_t, bool>> order_of(const BeamUnderTest &self, float share) {
+    const Occupancy occupancy(self.beam);
+    const auto cut = occupancy.best_cut(share);
+    std::array<uint8_t, BeamPackets::MAX_RAYS> order;
+    const uint32_t count = occupancy.sorted(self.beam, order);
+    std::vector<std::pair<uint32_t, bool>> result;
+    for (uint32_t i = 0; i < count; ++i)
+        result.emplace_back(order[i], cut && occupancy.is_beyond(order[i], *cut));
+    return result;
+}
+
+} // namespace
+
+void bind_beam_leaf_selftest(nb::module_ &m) {
+    nb::module_ s = m.def_submodule("beam_leaf_selftest");
+    nb::class_<BeamUnderTest>(s, "Beam")
+        .def(nb::init<const std::array<float, 3> &, const Rows &>(), nb::arg("origin"),
+             nb::arg("directions"))
+        .def("describe", &describe)
+        .def("forms", &forms_of, nb::arg("vertices"))
+        .def("grid_may_hit", &grid_may_hit)
+        .def("order", &order_of, nb::arg("share"));
+}
+
+} // namespace mlrt
