@@ -1,42 +1,16 @@
 #include "mlrta/beam_leaf.h"
 
-#include "geometry/ray_packet.h"
-#include "mlrta/ray_grid.h"
-#include "mlrta/triangle_forms.h"
-#include "traverse/load_packet.h"
+#include "geometry/triangle_test.h"
+#include "mlrta/beam_triangle_tests.h"
 #include "traverse/parameter_interval.h"
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 
 namespace mlrt {
 
 namespace {
-
-Vec3f direction_of(const RayGroup &rays, uint32_t i) {
-    return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-}
-
-// Triangles that a beam has been tested against, as far as a small direct-mapped table
-// remembers them.
-class Mailbox {
-public:
-    Mailbox() { entries_.fill(NO_PRIMITIVE); }
-
-    // Whether it was there already; it is from now on.
-    bool put(uint32_t primitive) {
-        uint32_t &entry = entries_[primitive % SIZE];
-        const bool known = entry == primitive;
-        entry = primitive;
-        return known;
-    }
-
-private:
-    static constexpr uint32_t SIZE = 64;
-    std::array<uint32_t, SIZE> entries_;
-};
 
 // Depths at which the rays of a beam cross a plane across one axis, for a plane ahead at a
 // distance of one: at least `first`, at most `last`.
@@ -44,23 +18,19 @@ struct CrossingDepths {
     float first, last;
 };
 
-// A beam that has been tested against more triangles than these meets a dense surface;
-// chosen.
-constexpr uint32_t DENSE_TRIANGLES = 64;
-
+// Takes a beam through subtrees, front to back.
 template <Query query>
-class BeamLeafTracer {
+class BeamWalk {
 public:
-    BeamLeafTracer(const KdTree &tree, const RayGroup &rays, uint32_t most_triangles,
-                   BeamPackets &beam, Counters &counters)
-        : tree_(tree), rays_(rays), beam_(beam), counters_(counters),
-          triangles_left_(most_triangles) {
+    BeamWalk(const KdTree &tree, const BeamPackets &beam, BeamTriangleTests<query> &tests,
+             Counters &counters)
+        : tree_(tree), beam_(beam), tests_(tests), counters_(counters) {
         prepare_crossings();
         prepare_sides();
-        update_least();
     }
 
-    bool trace(const Entry &entry);
+    // Returns false if the beam was given up.
+    bool walk(const Entry &entry);
 
 private:
     struct Depths {
@@ -80,40 +50,21 @@ private:
     void prepare_sides();
     bool clip(Depths &depths) const;
     bool beside() const;
-    void test_leaf(KdNode leaf);
-    void flush();
-    void test_block(const uint32_t *numbers, uint32_t count);
-    void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
-    bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
-                     uint32_t primitive, bool covered);
-    void test_unsafe(BeamPacket &packet, uint32_t primitive);
-    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
-                uint32_t primitive);
-    void update_least();
 
     const KdTree &tree_;
-    const RayGroup &rays_;
-    BeamPackets &beam_;
+    const BeamPackets &beam_;
+    BeamTriangleTests<query> &tests_;
     Counters &counters_;
-    uint32_t triangles_left_;
-    uint32_t tested_ = 0;
-    bool dense_ = false; // whether there are many triangles
-    RayGrid grid_;       // where there are
-    std::array<uint32_t, 3 * BLOCK_WIDTH> waiting_;
-    uint32_t waiting_count_ = 0;
-    Mailbox mailbox_;
     std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
     std::array<float, 6> cell_;      // lower and upper bounds relative to the origin
     Vec3<PointPacket> side_normals_; // of the four sides of the beam, outward
     float side_slack_ = 0;
-    float least_ = 0;   // of all rays
-    float far_end_ = 0; // no ray has anything to find beyond this depth
 };
 
 // A slope in [lo, hi] crosses a plane at distance q at a depth in [q / hi, q / lo], if it
 // leads there. The slopes have two roundings, and the products to come two more.
 template <Query query>
-void BeamLeafTracer<query>::prepare_crossings() {
+void BeamWalk<query>::prepare_crossings() {
     const auto towards = [](float lo, float hi) -> CrossingDepths {
         return {hi > 0 ? WIDEN_NEAR / hi : INFINITE, lo > 0 ? WIDEN_FAR / lo : INFINITE};
     };
@@ -127,7 +78,7 @@ void BeamLeafTracer<query>::prepare_crossings() {
 // The planes through the origin that bound the rectangle: outside where
 // +-(p - center) - half > 0, times the depth.
 template <Query query>
-void BeamLeafTracer<query>::prepare_sides() {
+void BeamWalk<query>::prepare_sides() {
     const SlopeRectangle &r = beam_.rectangle;
     const auto [i, j, k] = beam_.axes;
     const float c = r.cosine, s = r.sine;
@@ -150,7 +101,7 @@ void BeamLeafTracer<query>::prepare_sides() {
 
 // Whether the cell lies wholly on the outer side of one of the beam's sides.
 template <Query query>
-bool BeamLeafTracer<query>::beside() const {
+bool BeamWalk<query>::beside() const {
     PointPacket innermost(-side_slack_);
     for (int axis = 0; axis < 3; ++axis)
         innermost = innermost + minimum(side_normals_[axis] * PointPacket(cell_[axis]),
@@ -160,7 +111,7 @@ bool BeamLeafTracer<query>::beside() const {
 
 // Shortens the depths to those of the cell. Returns whether any are left.
 template <Query query>
-bool BeamLeafTracer<query>::clip(Depths &depths) const {
+bool BeamWalk<query>::clip(Depths &depths) const {
     for (int axis = 0; axis < 3; ++axis) {
         const float lo = cell_[axis], hi = cell_[3 + axis];
         const auto &crossing = crossing_[axis];
@@ -176,7 +127,7 @@ bool BeamLeafTracer<query>::clip(Depths &depths) const {
 }
 
 template <Query query>
-bool BeamLeafTracer<query>::trace(const Entry &entry) {
+bool BeamWalk<query>::walk(const Entry &entry) {
     struct Change {
         uint32_t bound;
         float before;
@@ -195,7 +146,7 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
     };
     uint32_t node_index = entry.node;
     Depths depths{0, INFINITE};
-    if (!clip(depths) || depths.near > far_end_ || least_ == INFINITE)
+    if (!clip(depths) || depths.near > tests_.far_end() || tests_.all_done())
         return true;
     for (;;) {
         const KdNode node = tree_.node(node_index);
@@ -211,7 +162,7 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
             const float first = size * unit.first - TINY_PARAMETER;
             const float last = size * unit.last + TINY_PARAMETER;
             const bool enter_near = !(last < depths.near);
-            const bool enter_far = !(first > depths.far) && !(first > far_end_);
+            const bool enter_far = !(first > depths.far) && !(first > tests_.far_end());
             const uint32_t far_child = node.lower_child() + 1 - above;
             const uint32_t far_bound = above ? axis + 3 : axis;
             const float far_near = first > depths.near ? first : depths.near;
@@ -232,17 +183,17 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
             }
         } else if (node.reference_count() > 0 && !beside()) {
             ++counters_.leaf_visits;
-            test_leaf(node);
-            if (triangles_left_ == 0)
+            tests_.test_leaf(node);
+            if (tests_.spent())
                 return false;
         }
         do {
             if (pending == 0)
-                flush();
-            if (pending == 0 || least_ == INFINITE)
+                tests_.flush();
+            if (pending == 0 || tests_.all_done())
                 return true;
             --pending;
-        } while (stack[pending].depths.near > far_end_);
+        } while (stack[pending].depths.near > tests_.far_end());
         const Pending &next = stack[pending];
         while (changed > next.changes) {
             --changed;
@@ -254,229 +205,15 @@ bool BeamLeafTracer<query>::trace(const Entry &entry) {
     }
 }
 
-// Where a beam meets many triangles, each leaf's are only fetched, to be tested when those
-// of the next have been as well: the memory has time to bring them, and blocks are full.
-template <Query query>
-void BeamLeafTracer<query>::test_leaf(KdNode leaf) {
-    for (const uint32_t primitive : tree_.references_of(leaf)) {
-        if (mailbox_.put(primitive))
-            continue;
-        waiting_[waiting_count_++] = primitive;
-        if (dense_) {
-            prefetch(&tree_.triangles[primitive]);
-            if (waiting_count_ == waiting_.size()) {
-                test_block(waiting_.data(), BLOCK_WIDTH);
-                waiting_count_ -= BLOCK_WIDTH;
-                std::copy_n(waiting_.begin() + BLOCK_WIDTH, waiting_count_,
-                            waiting_.begin());
-            }
-        } else if (waiting_count_ == BLOCK_WIDTH) {
-            flush();
-        }
-    }
-    if (!dense_)
-        flush();
-}
-
-// Tests the triangles that wait.
-template <Query query>
-void BeamLeafTracer<query>::flush() {
-    std::array<uint32_t, BLOCK_WIDTH> numbers;
-    for (uint32_t first = 0; first < waiting_count_; first += BLOCK_WIDTH) {
-        const uint32_t count = std::min(waiting_count_ - first, BLOCK_WIDTH);
-        numbers.fill(waiting_[first]);
-        std::copy_n(waiting_.begin() + first, count, numbers.begin());
-        test_block(numbers.data(), count);
-    }
-    waiting_count_ = 0;
-}
-
-template <Query query>
-void BeamLeafTracer<query>::test_block(const uint32_t *numbers, uint32_t count) {
-    TriangleForms forms;
-    forms.set(beam_, least_, tree_.triangles.data(), numbers, count);
-    ++counters_.beam_blocks;
-    const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
-    counters_.beam_triangles += tested;
-    triangles_left_ -= std::min(triangles_left_, tested);
-    tested_ += tested;
-    if (tested_ > DENSE_TRIANGLES && !dense_) {
-        grid_.fill(beam_);
-        dense_ = true;
-    }
-    for_each_lane(forms.possible, [&](uint32_t lane) {
-        if (dense_ && !grid_.may_hit(forms.box_p[lane], forms.box_q[lane],
-                                     forms.box_half_p[lane], forms.box_half_q[lane]))
-            return;
-        test_triangle(forms, lane, numbers[lane]);
-    });
-    for_each_lane(forms.unsafe, [&](uint32_t lane) {
-        for (uint32_t n = 0; n < beam_.count; ++n)
-            test_unsafe(beam_.packets[n], numbers[lane]);
-    });
-}
-
-// Packets that the triangle may touch, sixteen at a time, then their rays.
-template <Query query>
-void BeamLeafTracer<query>::test_triangle(const TriangleForms &forms, uint32_t lane,
-                                          uint32_t primitive) {
-    const auto beside = (absolute(beam_.center_p - forms.box_p[lane]) >
-                         beam_.half_p + forms.box_half_p[lane]) |
-                        (absolute(beam_.center_q - forms.box_q[lane]) >
-                         beam_.half_q + forms.box_half_q[lane]);
-    LaneBits packets = ((1u << beam_.count) - 1) & ~to_bits(beside);
-    if (packets == 0)
-        return;
-    const FloatPacket edge_error(forms.edge_error[lane]);
-    MaskOf<FloatPacket> touched, covered;
-    FloatPacket smallest, greatest;
-    for (int form = 0; form < 4; ++form) {
-        const FloatPacket of_p(forms.of_p[form][lane]), of_q(forms.of_q[form][lane]);
-        const FloatPacket middle =
-            fused(of_p, beam_.center_p,
-                  fused(of_q, beam_.center_q, FloatPacket(forms.center[form][lane])));
-        const FloatPacket extent =
-            fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
-        if (form == TriangleForms::DEPTH) {
-            greatest = middle + extent;
-        } else if (form == 0) {
-            smallest = middle - extent;
-            greatest = middle + extent;
-        } else {
-            smallest = minimum(smallest, middle - extent);
-            greatest = minimum(greatest, middle + extent);
-        }
-        if (form == 2) {
-            touched = greatest >= -edge_error;
-            covered = smallest > edge_error;
-        }
-    }
-    const FloatPacket highest = fused(greatest, FloatPacket(forms.depth_grow[lane]),
-                                      FloatPacket(forms.depth_error[lane]));
-    packets &= to_bits(touched & (highest >= load<FloatPacket>(beam_.least)));
-    const LaneBits covered_packets = to_bits(covered);
-    bool changed = false;
-    for_each_lane(packets, [&](uint32_t n) {
-        changed |= test_packet(beam_.packets[n], forms, lane, primitive,
-                               (covered_packets >> n & 1) != 0);
-    });
-    if (changed)
-        update_least();
-}
-
-// One triangle against sixteen rays. Returns whether they found something.
-template <Query query>
-bool BeamLeafTracer<query>::test_packet(BeamPacket &packet, const TriangleForms &forms,
-                                        uint32_t lane, uint32_t primitive, bool covered) {
-    ++counters_.triangle_tests;
-    const auto value = [&](int form) {
-        return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
-                     fused(packet.v, FloatPacket(forms.of_v[form][lane]),
-                           FloatPacket(forms.constant[form][lane])));
-    };
-    const FloatPacket depth = value(TriangleForms::DEPTH);
-    const FloatPacket error(forms.depth_error[lane]);
-    const FloatPacket highest = fused(depth, FloatPacket(forms.depth_grow[lane]), error);
-    LaneBits possible = to_bits(highest >= packet.least);
-    LaneBits certain = possible;
-    if (!covered) {
-        const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-        const FloatPacket edge_error(forms.edge_error[lane]);
-        possible &= to_bits(smallest >= -edge_error);
-        if (possible == 0)
-            return false;
-        certain = possible & to_bits(smallest > edge_error);
-    } else if (possible == 0) {
-        return false;
-    }
-    const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
-    const LaneBits nearer =
-        certain & to_bits((lowest > packet.greatest) & (highest < packet.nearest));
-    if (nearer != 0) {
-        const auto mask = from_bits<FloatPacket>(nearer);
-        packet.found |= nearer;
-        if constexpr (query == Query::any) {
-            packet.least = select(mask, FloatPacket(INFINITE), packet.least);
-        } else {
-            packet.least = select(mask, lowest, packet.least);
-            packet.greatest = select(mask, highest, packet.greatest);
-            packet.primitive = select(from_bits<UIntPacket>(nearer), UIntPacket(primitive),
-                                      packet.primitive);
-        }
-    }
-    if ((possible & ~nearer) != 0)
-        decide(packet, possible & ~nearer, certain, primitive);
-    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
-    return true;
-}
-
-// By the contract of geometry/triangle_test.h, ray by ray.
-template <Query query>
-void BeamLeafTracer<query>::decide(BeamPacket &packet, LaneBits lanes,
-                                   LaneBits certain_hits, uint32_t primitive) {
-    const Triangle &triangle = tree_.triangles[primitive];
-    LaneArray<float> least = to_lanes<float>(packet.least);
-    LaneArray<float> greatest = to_lanes<float>(packet.greatest);
-    LaneArray<uint32_t> best = to_lanes<uint32_t>(packet.primitive);
-    for_each_lane(lanes, [&](uint32_t lane) {
-        const uint32_t ray = packet.first_ray + lane;
-        const Vec3f direction = direction_of(rays_, ray);
-        ++counters_.double_tests;
-        if ((certain_hits >> lane & 1) == 0) {
-            const HitDecision decision = decide_hit(beam_.origin, direction, triangle);
-            counters_.exact_tests += decision.precision == Precision::exact;
-            if (!decision.hit)
-                return;
-        }
-        const float t = hit_distance(beam_.origin, direction, triangle);
-        if (!(t > std::max(rays_.t_min[ray], 0.0f) && t < INFINITE))
-            return;
-        if ((packet.found >> lane & 1) == 0) {
-            if (!(t <= rays_.t_max[ray]))
-                return;
-        } else {
-            const float other =
-                hit_distance(beam_.origin, direction, tree_.triangles[best[lane]]);
-            if (!(t < other || (t == other && primitive < best[lane])))
-                return;
-        }
-        packet.found |= 1u << lane;
-        best[lane] = primitive;
-        // Of the distance, of the product, and of the reciprocal.
-        const double depth = double(t) * std::abs(direction[beam_.axes[2]]);
-        least[lane] = query == Query::any ? INFINITE
-                                          : float(std::min((1 - 0x1p-21) / depth, 0x1p126));
-        greatest[lane] = float((1 + 0x1p-21) / depth);
-    });
-    packet.least = load<FloatPacket>(least);
-    packet.greatest = load<FloatPacket>(greatest);
-    packet.primitive = load<UIntPacket>(best);
-}
-
-// A triangle of which the forms say nothing, such as one whose plane holds the origin.
-template <Query query>
-void BeamLeafTracer<query>::test_unsafe(BeamPacket &packet, uint32_t primitive) {
-    const LaneBits searching = packet.active & to_bits(packet.least < INFINITE);
-    ++counters_.triangle_tests;
-    decide(packet, searching, 0, primitive);
-    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
-    update_least();
-}
-
-template <Query query>
-void BeamLeafTracer<query>::update_least() {
-    least_ = least_lane(load<FloatPacket>(beam_.least));
-    far_end_ = (1 + 4 * FLOAT_ROUNDOFF) / least_;
-}
-
 } // namespace
 
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      uint32_t most_triangles, BeamPackets &beam, Counters &counters) {
-    BeamLeafTracer<query> tracer(tree, rays, most_triangles, beam, counters);
+    BeamTriangleTests<query> tests(tree, rays, most_triangles, beam, counters);
+    BeamWalk<query> walk(tree, beam, tests, counters);
     for (uint32_t i = 0; i < frontier.count; ++i)
-        if (!tracer.trace(frontier.entries[i]))
+        if (!walk.walk(frontier.entries[i]))
             return false;
     return true;
 }
@@ -487,48 +224,5 @@ template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
 template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
                                           const Frontier &, uint32_t, BeamPackets &,
                                           Counters &);
-
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Counters &counters) {
-    // Fewer lanes of a triangle than this are faster one by one; chosen.
-    constexpr int FEW = 3;
-    Vec3<DoublePacket> direction;
-    for (int k = 0; k < 3; ++k)
-        direction[k] =
-            to_double(load_padded(rays.direction[k], packet.first_ray, rays.count));
-    const DoublePacket max_direction = maximum(
-        absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
-    const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(packet.primitive);
-    FloatPacket t(INFINITE);
-    LaneBits one_by_one = 0;
-    for (LaneBits left = packet.found; left != 0;) {
-        const uint32_t primitive = primitives[uint32_t(std::countr_zero(left))];
-        const LaneBits same = to_bits(packet.primitive == UIntPacket(primitive)) & left;
-        left &= ~same;
-        if (std::popcount(same) <= FEW) {
-            one_by_one |= same;
-            continue;
-        }
-        const Triangle &triangle = tree.triangles[primitive];
-        const TrianglePlane plane(triangle);
-        const Vec3d to_vertex = Vec3d(triangle.a) - Vec3d(rays.common_origin);
-        const PlaneDistance<DoublePacket> distance(
-            plane, PlaneNumerator<double>(plane, to_vertex), direction, max_direction);
-        t = select(from_bits<FloatPacket>(same), distance.template rounded<FloatPacket>(),
-                   t);
-        const LaneBits open = same & ~to_bits(distance.template certain<FloatPacket>());
-        counters.exact_distances += uint64_t(std::popcount(open));
-        one_by_one |= open;
-    }
-    if (one_by_one == 0)
-        return t;
-    LaneArray<float> distances = to_lanes<float>(t);
-    for_each_lane(one_by_one, [&](uint32_t lane) {
-        distances[lane] =
-            hit_distance(rays.common_origin, direction_of(rays, packet.first_ray + lane),
-                         tree.triangles[primitives[lane]]);
-    });
-    return load<FloatPacket>(distances);
-}
 
 } // namespace mlrt

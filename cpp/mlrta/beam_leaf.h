@@ -21,9 +21,4 @@ template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      uint32_t most_triangles, BeamPackets &beam, Counters &counters);
 
-// Distances of the nearest hits that a packet has found; other lanes hold any value. At
-// least one must have found something.
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Counters &counters);
-
 } // namespace mlrt

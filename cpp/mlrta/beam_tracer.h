@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mlrta/beam_leaf.h"
+#include "mlrta/beam_triangle_tests.h"
 #include "mlrta/packet_tracer.h"
 
 #include <bit>

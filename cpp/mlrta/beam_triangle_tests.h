@@ -1,0 +1,90 @@
+// Triangles of leaves against a beam, then against its packets, and what remains against
+// rays: the inner part of the beam-leaf traversal.
+#pragma once
+
+#include "base/counters.h"
+#include "kdtree/tree.h"
+#include "mlrta/beam_packets.h"
+#include "mlrta/ray_grid.h"
+#include "mlrta/triangle_forms.h"
+#include "traverse/query.h"
+
+#include <array>
+#include <cstdint>
+
+namespace mlrt {
+
+// Triangles that a beam has been tested against, as far as a small direct-mapped table
+// remembers them.
+class Mailbox {
+public:
+    Mailbox() { entries_.fill(NO_PRIMITIVE); }
+
+    // Whether it was there already; it is from now on.
+    bool put(uint32_t primitive) {
+        uint32_t &entry = entries_[primitive % SIZE];
+        const bool known = entry == primitive;
+        entry = primitive;
+        return known;
+    }
+
+private:
+    static constexpr uint32_t SIZE = 64;
+    std::array<uint32_t, SIZE> entries_;
+};
+
+// Keeps in the beam's packets what its rays have found. The group is the one that the beam
+// was loaded from.
+template <Query query>
+class BeamTriangleTests {
+public:
+    BeamTriangleTests(const KdTree &tree, const RayGroup &rays, uint32_t most_triangles,
+                      BeamPackets &beam, Counters &counters)
+        : tree_(tree), rays_(rays), beam_(beam), counters_(counters),
+          triangles_left_(most_triangles) {
+        update_least();
+    }
+
+    // Tests the triangles of a leaf, or puts them off till the next call or flush().
+    void test_leaf(KdNode leaf);
+    // Tests those that were put off.
+    void flush();
+
+    // No ray has anything to find beyond this depth.
+    float far_end() const { return far_end_; }
+    // Whether no ray has anything to find at all.
+    bool all_done() const { return least_ == INFINITY; }
+    // Whether the beam has been tested against all the triangles that it may be.
+    bool spent() const { return triangles_left_ == 0; }
+
+private:
+    void test_block(const uint32_t *numbers, uint32_t count);
+    void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
+    bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
+                     uint32_t primitive, bool covered);
+    void test_unsafe(BeamPacket &packet, uint32_t primitive);
+    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+                uint32_t primitive);
+    void update_least();
+
+    const KdTree &tree_;
+    const RayGroup &rays_;
+    BeamPackets &beam_;
+    Counters &counters_;
+    uint32_t triangles_left_;
+    uint32_t tested_ = 0;
+    bool dense_ = false; // whether there are many triangles
+    RayGrid grid_;       // where there are
+    std::array<uint32_t, 3 * BLOCK_WIDTH> waiting_;
+    uint32_t waiting_count_ = 0;
+    Mailbox mailbox_;
+    float least_ = 0; // of all rays
+    float far_end_ = 0;
+};
+
+// Distances of the nearest hits that a packet has found; other lanes hold any value. At
+// least one must have found something.
+FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
+                          const BeamPacket &packet, Counters &counters);
+
+} // namespace mlrt
