@@ -14,8 +14,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <drjit/math.h>
 #include <drjit/packet.h>
 #include <type_traits>
+#include <utility>
 
 namespace mlrt {
 
@@ -108,6 +110,11 @@ T square_root(const T &a) {
     return drjit::sqrt(a);
 }
 
+// As Mitsuba computes it, to within a few units in the last place.
+inline FloatPacket arc_cosine(const FloatPacket &a) {
+    return drjit::acos(a);
+}
+
 // a * b + c, rounded once: every processor we build for has it as an instruction.
 template <typename T>
 T fused(const T &a, const T &b, const T &c) {
@@ -169,12 +176,41 @@ MaskOf<T> from_bits(LaneBits bits) {
     return MaskOf<T>((UIntPacket(bits) & lane_bit) != 0u);
 }
 
+inline float first_lane(const FloatPacket &packet) {
+    return packet.entry(0);
+}
+inline uint32_t lane_of(const UIntPacket &packet, uint32_t lane) {
+#if defined(__AVX512F__)
+    return uint32_t(_mm512_cvtsi512_si32(
+        _mm512_permutexvar_epi32(_mm512_set1_epi32(int(lane)), packet.m)));
+#else
+    return packet.entry(lane);
+#endif
+}
+
+// 0, 1, 2 ...
+inline FloatPacket lane_numbers() {
+    return drjit::arange<FloatPacket>();
+}
+
 // Calls visit(lane) for each set bit, lowest first.
 template <typename Visit>
 void for_each_lane(LaneBits bits, Visit &&visit) {
     while (bits) {
         visit(uint32_t(__builtin_ctz(bits)));
         bits &= bits - 1;
+    }
+}
+
+// Calls visit(value, lanes) for each value that some of the given lanes hold, with those
+// that do.
+template <typename Visit>
+void for_each_value(const UIntPacket &values, LaneBits lanes, Visit &&visit) {
+    while (lanes != 0) {
+        const uint32_t value = lane_of(values, uint32_t(__builtin_ctz(lanes)));
+        const LaneBits holders = lanes & to_bits(values == UIntPacket(value));
+        visit(value, holders);
+        lanes &= ~holders;
     }
 }
 
@@ -303,6 +339,10 @@ inline Vec3d to_double(Vec3f v) {
 inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
     return {DoublePacket(v.x), DoublePacket(v.y), DoublePacket(v.z)};
 }
+
+// The type that to_double() gives.
+template <typename Real>
+using DoubleOf = decltype(to_double(std::declval<Real>()));
 
 // Keeps denormal numbers while it lives: Dr.Jit's threads flush them to zero.
 class KeepDenormals {

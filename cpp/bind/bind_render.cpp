@@ -83,18 +83,18 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     const size_t height = scene->data.film.crop_height, width = scene->data.film.crop_width;
     nb::dict pictures;
     if (settings.aovs.depth)
-        pictures["depth"] = to_numpy<float>(std::move(result.depth), {height, width});
+        pictures["depth"] = to_numpy(result.depth.release(), {height, width});
     if (settings.aovs.normal)
-        pictures["normal"] = to_numpy<float>(std::move(result.normal), {height, width, 3});
+        pictures["normal"] = to_numpy(result.normal.release(), {height, width, 3});
     if (settings.aovs.primitive)
-        pictures["prim"] = to_numpy<int32_t>(std::move(result.primitive), {height, width});
+        pictures["prim"] = to_numpy(result.primitive.release(), {height, width});
     if (settings.aovs.cost)
-        pictures["cost"] = to_numpy<float>(std::move(result.cost), {height, width});
+        pictures["cost"] = to_numpy(result.cost.release(), {height, width});
     nb::dict counters;
     counters.update(counters_to_dict(result.counters.primary, "primary_"));
     counters.update(counters_to_dict(result.counters.shadow, "shadow_"));
     nb::dict answer;
-    answer["image"] = to_numpy<float>(std::move(result.image), {height, width, 3});
+    answer["image"] = to_numpy(result.image.release(), {height, width, 3});
     answer["aovs"] = pictures;
     answer["counters"] = counters;
     answer["seconds"] = seconds;

@@ -74,7 +74,7 @@ accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &s
     for (const auto &[x, y, value] : samples) {
         const float *values = &value;
         blocks.add(uint32_t(int(std::floor(x)) - sampled.x),
-                   uint32_t(int(std::floor(y)) - sampled.y), 1, &x, &y, &values);
+                   uint32_t(int(std::floor(y)) - sampled.y), 0, 1, &x, &y, &values);
     }
     std::vector<float> sums, weights;
     for (uint32_t row = 0; row < film.crop_height; ++row)
@@ -99,7 +99,7 @@ nb::dict emitter_sample(const SceneHandle &handle, const Floats3 &p, float x, fl
 nb::dict hit_surface_of(const SceneHandle &handle, const Floats3 &origin,
                         const Floats3 &direction, uint32_t primitive) {
     const SurfacePoint<float> point =
-        hit_surface<float>(*handle.scene, vector(origin), vector(direction), primitive);
+        hit_surface(*handle.scene, vector(origin), vector(direction), primitive);
     nb::dict result;
     result["p"] = array(point.p);
     result["face_normal"] = array(point.face_normal);
@@ -137,7 +137,7 @@ nb::dict hit_packet(const SceneHandle &handle, const Vectors &origins,
     const Vec3<FloatPacket> o = packet_of(origins), d = packet_of(directions);
     const Vec2<FloatPacket> at = barycentrics_of(o, d, corners_of(*handle.scene, faces));
     const SurfacePoint<FloatPacket> point =
-        hit_surface<FloatPacket>(*handle.scene, o, d, faces);
+        hit_surfaces(*handle.scene, o, d, load<UIntPacket>(faces), ALL_LANES);
     nb::dict result;
     result["weights"] = vectors_of({at.x, at.y, FloatPacket(0.0f)});
     result["p"] = vectors_of(point.p);
@@ -148,15 +148,27 @@ nb::dict hit_packet(const SceneHandle &handle, const Vectors &origins,
 
 nb::dict emitter_packet(const SceneHandle &handle, const Vectors &points,
                         const Vectors &numbers) {
-    const Vec3<FloatPacket> random = packet_of(numbers);
-    const EmitterSamples samples =
-        sample_emitter(*handle.scene, packet_of(points), random.x, random.y, ALL_LANES);
+    const Vec3<FloatPacket> p = packet_of(points), random = packet_of(numbers);
+    const EmitterChoices choices = choose_emitters(*handle.scene, random.x);
+    Vectors weight(PACKET_WIDTH), direction(PACKET_WIDTH), target(PACKET_WIDTH);
+    for_each_value(choices.emitter, ALL_LANES, [&](uint32_t emitter, LaneBits lanes) {
+        const EmitterSample<FloatPacket> sample =
+            sample_chosen(*handle.scene, emitter, choices, p, random.y);
+        const Vectors weights = vectors_of(sample.weight);
+        const Vectors directions = vectors_of(sample.direction);
+        const Vectors targets = vectors_of(sample.target);
+        for_each_lane(lanes, [&](uint32_t lane) {
+            weight[lane] = weights[lane];
+            direction[lane] = directions[lane];
+            target[lane] = targets[lane];
+        });
+    });
+    const LaneArray<uint32_t> emitters = to_lanes<uint32_t>(choices.emitter);
     nb::dict result;
-    result["weight"] = vectors_of(samples.weight);
-    result["direction"] = vectors_of(samples.direction);
-    result["target"] = vectors_of(samples.target);
-    result["emitter"] =
-        std::vector<uint32_t>(samples.emitter.begin(), samples.emitter.end());
+    result["weight"] = weight;
+    result["direction"] = direction;
+    result["target"] = target;
+    result["emitter"] = std::vector<uint32_t>(emitters.begin(), emitters.end());
     return result;
 }
 

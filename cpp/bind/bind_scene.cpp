@@ -3,6 +3,7 @@
 #include "bind/fields.h"
 #include "bind/scene_handle.h"
 #include "bind/tree_handle.h"
+#include "render/filter.h"
 
 #include <cmath>
 #include <cstring>

@@ -6,6 +6,8 @@
 #include "base/simd.h"
 #include "base/vec.h"
 
+#include <type_traits>
+
 namespace mlrt {
 
 // The vertices of a triangle, or of one a lane.
@@ -14,20 +16,25 @@ struct Corners {
     Vec3<Real> a, b, c;
 };
 
-// Weights of the vertices b and c.
-template <typename Real>
-Vec2<Real> barycentrics_of(const Vec3<Real> &origin, const Vec3<Real> &direction,
-                           const Corners<Real> &corners) {
-    const auto o = to_double(origin), d = to_double(direction);
-    const auto a = to_double(corners.a) - o;
-    const auto b = to_double(corners.b) - o;
-    const auto c = to_double(corners.c) - o;
+// Weights of the vertices b and c. What sixteen rays share is given once: Origin and Corner
+// are float then, else Real. The results are the same.
+template <typename Real, typename Origin, typename Corner>
+Vec2<Real> barycentrics_of(const Vec3<Origin> &origin, const Vec3<Real> &direction,
+                           const Corners<Corner> &corners) {
+    using Shared =
+        std::conditional_t<std::is_same_v<Origin, float>, DoubleOf<Corner>, DoubleOf<Real>>;
+    using Double = DoubleOf<Real>;
+    const auto o = Vec3<Shared>(to_double(origin));
+    const auto d = to_double(direction);
+    const auto a = Vec3<Shared>(to_double(corners.a)) - o;
+    const auto b = Vec3<Shared>(to_double(corners.b)) - o;
+    const auto c = Vec3<Shared>(to_double(corners.c)) - o;
     // All three have one sign or are rounding noise around zero.
-    const auto u = absolute(dot(d, cross(b, c)));
-    const auto v = absolute(dot(d, cross(c, a)));
-    const auto w = absolute(dot(d, cross(a, b)));
-    const auto sum = u + v + w;
-    const MaskOf<Real> has_area(sum > 0.0);
+    const Double u = absolute(dot(d, Vec3<Double>(cross(b, c))));
+    const Double v = absolute(dot(d, Vec3<Double>(cross(c, a))));
+    const Double w = absolute(dot(d, Vec3<Double>(cross(a, b))));
+    const Double sum = u + v + w;
+    const MaskOf<Real> has_area(sum > Double(0.0));
     const Real weight_b = select(has_area, Real(v / sum), Real(0.0f));
     const Real weight_c = select(has_area, Real(w / sum), Real(0.0f));
     return {weight_b, minimum(weight_c, Real(1.0f) - weight_b)};

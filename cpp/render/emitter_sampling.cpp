@@ -3,8 +3,9 @@
 #include "render/surface.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
+#include <type_traits>
+#include <vector>
 
 namespace mlrt {
 
@@ -29,57 +30,11 @@ OneChoice choose_emitter(const PreparedScene &scene, float x) {
     return {index, float(count), scaled - float(index)};
 }
 
-struct Choices {
-    UIntPacket emitter;
-    FloatPacket weight, reused;
-};
-
-// The same for sixteen numbers.
-Choices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
-    constexpr size_t FEW = 16; // compared with all; chosen
-    const uint32_t count = uint32_t(scene.data.emitters.size());
-    if (scene.emitter_choice.empty()) {
-        const FloatPacket scaled = x * FloatPacket(float(count));
-        // Truncated, as conversion to an integer does; x < 1 may round up to the count.
-        const FloatPacket index =
-            minimum(FloatPacket(UIntPacket(scaled)), FloatPacket(float(count - 1)));
-        return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
-    }
-    if (scene.emitter_choice.size() <= FEW) {
-        const Distribution::Choices choices = scene.emitter_choice.choose(x);
-        return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
-    }
-    const LaneArray<float> random = to_lanes<float>(x);
-    LaneArray<uint32_t> emitter;
-    LaneArray<float> weight, reused;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const OneChoice choice = choose_emitter(scene, random[lane]);
-        emitter[lane] = choice.emitter;
-        weight[lane] = choice.weight;
-        reused[lane] = choice.reused;
-    }
-    return {load<UIntPacket>(emitter), load<FloatPacket>(weight),
-            load<FloatPacket>(reused)};
-}
-
 template <typename Real>
 struct AreaPoint {
     Vec3<Real> p;
     Vec3<Real> normal; // unit, on the glowing side
 };
-
-// Calls function(value) for the values of all lanes.
-template <typename Function>
-float by_lane(float value, Function &&function) {
-    return function(value);
-}
-template <typename Function>
-FloatPacket by_lane(const FloatPacket &values, Function &&function) {
-    LaneArray<float> lanes = to_lanes<float>(values);
-    for (float &value : lanes)
-        value = function(value);
-    return load<FloatPacket>(lanes);
-}
 
 // The face that y chooses, and y made uniform again.
 float choose_face(const EmitterTable &table, uint32_t first_face, float y, uint32_t &face) {
@@ -110,7 +65,7 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
                 spread<Real>(table.normal)};
 
     const Shape &shape = scene.data.shapes[emitter.shape];
-    FacesOf<Real> faces;
+    std::conditional_t<std::is_same_v<Real, float>, uint32_t, FaceNumbers> faces;
     const Real reused = choose_face(table, shape.first_face, y, faces);
     const Corners<Real> corners = corners_of(scene, faces);
     const Vec3<Real> e0 = corners.b - corners.a, e1 = corners.c - corners.a;
@@ -134,13 +89,20 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
 }
 
 // Mitsuba's spot.cpp, falloff_curve: linear in the angle between beam width and cut-off.
+FloatPacket spot_falloff(const Emitter &emitter, const EmitterTable &table,
+                         const FloatPacket &cosine) {
+    const FloatPacket zero(0.0f), one(1.0f);
+    const auto lit = cosine > FloatPacket(table.cos_cutoff);
+    const auto full = cosine >= FloatPacket(table.cos_beam);
+    if ((to_bits(lit) & ~to_bits(full)) == 0)
+        return select(lit, one, zero);
+    const FloatPacket falloff =
+        (FloatPacket(emitter.cutoff_angle) - arc_cosine(minimum(cosine, one))) *
+        FloatPacket(table.inverse_transition);
+    return select(full, one, select(lit, falloff, zero));
+}
 float spot_falloff(const Emitter &emitter, const EmitterTable &table, float cosine) {
-    if (!(cosine > table.cos_cutoff))
-        return 0;
-    if (cosine >= table.cos_beam)
-        return 1;
-    const float angle = float(std::acos(std::min(double(cosine), 1.0)));
-    return (emitter.cutoff_angle - angle) * table.inverse_transition;
+    return first_lane(spot_falloff(emitter, table, FloatPacket(cosine)));
 }
 
 // Light of one emitter; choice_weight is 1 / the probability that it was chosen.
@@ -167,9 +129,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         factor = inverse * inverse * choice_weight;
         if (emitter.type == EmitterType::spot) {
             const Real cosine = -dot(sample.direction, spread<Real>(emitter.direction));
-            factor = factor * by_lane(cosine, [&](float lane_cosine) {
-                         return spot_falloff(emitter, table, lane_cosine);
-                     });
+            factor = factor * spot_falloff(emitter, table, cosine);
         }
         break;
     }
@@ -214,34 +174,47 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
             choice.emitter};
 }
 
-EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket> &p,
-                              const FloatPacket &x, const FloatPacket &y, LaneBits lanes) {
-    EmitterSamples samples;
-    if (scene.data.emitters.size() == 1) {
-        samples.emitter.fill(0);
-        static_cast<EmitterSample<FloatPacket> &>(samples) =
-            sample_one(scene, 0, FloatPacket(1.0f), p, x, y);
-        return samples;
+EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
+    constexpr size_t FEW = 16; // compared with all; chosen
+    const uint32_t count = uint32_t(scene.data.emitters.size());
+    if (count == 1)
+        return {UIntPacket(0u), FloatPacket(1.0f), x};
+    if (scene.emitter_choice.empty()) {
+        const FloatPacket scaled = x * FloatPacket(float(count));
+        // Truncated, as conversion to an integer does; x < 1 may round up to the count.
+        const FloatPacket index =
+            minimum(FloatPacket(UIntPacket(scaled)), FloatPacket(float(count - 1)));
+        return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
     }
-    const Choices choices = choose_emitters(scene, x);
-    // Lanes that chose the same emitter are served together.
-    const UIntPacket emitters = choices.emitter;
-    samples.emitter = to_lanes<uint32_t>(emitters);
-    samples.weight = samples.direction = samples.target = spread<FloatPacket>({});
-    while (lanes != 0) {
-        const uint32_t emitter = samples.emitter[uint32_t(std::countr_zero(lanes))];
-        const LaneBits served = to_bits(emitters == UIntPacket(emitter));
-        const EmitterSample<FloatPacket> part =
-            sample_one(scene, emitter, choices.weight, p, choices.reused, y);
-        const MaskOf<FloatPacket> mask = from_bits<FloatPacket>(served);
-        for (int k = 0; k < 3; ++k) {
-            samples.weight[k] = select(mask, part.weight[k], samples.weight[k]);
-            samples.direction[k] = select(mask, part.direction[k], samples.direction[k]);
-            samples.target[k] = select(mask, part.target[k], samples.target[k]);
-        }
-        lanes &= ~served;
+    if (scene.emitter_choice.size() <= FEW) {
+        const Distribution::Choices choices = scene.emitter_choice.choose(x);
+        return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
     }
-    return samples;
+    const LaneArray<float> random = to_lanes<float>(x);
+    LaneArray<uint32_t> emitter;
+    LaneArray<float> weight, reused;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const OneChoice choice = choose_emitter(scene, random[lane]);
+        emitter[lane] = choice.emitter;
+        weight[lane] = choice.weight;
+        reused[lane] = choice.reused;
+    }
+    return {load<UIntPacket>(emitter), load<FloatPacket>(weight),
+            load<FloatPacket>(reused)};
+}
+
+EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
+                                         const EmitterChoices &choices,
+                                         const Vec3<FloatPacket> &p, const FloatPacket &y) {
+    return sample_one(scene, emitter, choices.weight, p, choices.x, y);
+}
+
+bool needs_light_numbers(const PreparedScene &scene) {
+    const std::vector<Emitter> &emitters = scene.data.emitters;
+    return emitters.size() > 1 ||
+           std::any_of(emitters.begin(), emitters.end(), [](const Emitter &emitter) {
+               return emitter.type == EmitterType::area;
+           });
 }
 
 } // namespace mlrt

@@ -20,17 +20,24 @@ struct OneEmitterSample : EmitterSample<float> {
     uint32_t emitter = NONE;
 };
 
-// Sixteen samples, each of its own emitter.
-struct EmitterSamples : EmitterSample<FloatPacket> {
-    LaneArray<uint32_t> emitter;
-};
-
 // Light that arrives at p. x and y are uniform in [0, 1); the same numbers give the same
 // sample in Mitsuba.
 OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, float y);
 
-// Lanes that are not asked for get any sample. The scene must have an emitter.
-EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket> &p,
-                              const FloatPacket &x, const FloatPacket &y, LaneBits lanes);
+// The two steps of that for sixteen points: which emitters are chosen, then the light of
+// one of them. The scene must have an emitter.
+struct EmitterChoices {
+    UIntPacket emitter;
+    FloatPacket weight; // 1 / the probability of the choice
+    FloatPacket x;      // made uniform again
+};
+EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x);
+
+EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
+                                         const EmitterChoices &choices,
+                                         const Vec3<FloatPacket> &p, const FloatPacket &y);
+
+// Whether the numbers x and y make a difference.
+bool needs_light_numbers(const PreparedScene &scene);
 
 } // namespace mlrt

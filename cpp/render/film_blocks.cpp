@@ -24,54 +24,72 @@ FilmBlocks::FilmBlocks(const Film &film, uint32_t channel_count)
                  (channel_count_ + 1));
 }
 
-void FilmBlocks::add(uint32_t column, uint32_t row, uint32_t count, const float *x,
-                     const float *y, const float *const *values) {
+// Weights of a sample's pixels, of which the first lies (left, top) from it.
+struct FilmBlocks::Footprint {
+    static constexpr int MOST_TAPS = 64;
+    int taps;
+    float columns[MOST_TAPS], rows[MOST_TAPS];
+};
+
+FilmBlocks::Footprint FilmBlocks::footprint(float left, float top) const {
+    Footprint weights;
+    weights.taps = 2 * filter_.reach() + 1;
+    MLRT_CHECK(weights.taps <= Footprint::MOST_TAPS);
+    constexpr int width = int(PACKET_WIDTH);
+    const FloatPacket lane = lane_numbers();
+    for (int i = 0; i < weights.taps; i += width) {
+        store(&weights.columns[i], filter_.weight(FloatPacket(left) + (lane + float(i))));
+        store(&weights.rows[i], filter_.weight(FloatPacket(top) + (lane + float(i))));
+    }
+    return weights;
+}
+
+void FilmBlocks::add(uint32_t column, uint32_t row, size_t first, size_t count,
+                     const float *x, const float *y, const float *const *values) {
     MLRT_CHECK(column < sampled_.width && row < sampled_.height);
     const uint32_t block = row / BLOCK_SIZE * blocks_across_ + column / BLOCK_SIZE;
     const uint32_t inner_column = column % BLOCK_SIZE, inner_row = row % BLOCK_SIZE;
     const size_t entry = channel_count_ + 1;
     // The buffer begins `reach` pixels before the block: this is the footprint's first
     // entry.
-    float *first = sums_.data() +
-                   ((size_t(block) * stride_ + inner_row) * stride_ + inner_column) * entry;
-    if (filter_.is_box()) {
-        first[0] += float(count);
-        for (uint32_t k = 0; k < channel_count_; ++k) {
-            float sum = first[1 + k];
-            for (uint32_t i = 0; i < count; ++i)
-                sum += values[k][i];
-            first[1 + k] = sum;
-        }
-        return;
-    }
+    float *corner =
+        sums_.data() +
+        ((size_t(block) * stride_ + inner_row) * stride_ + inner_column) * entry;
     const int reach = filter_.reach();
     const float center_x = float(sampled_.x + int(column) - reach) + 0.5f;
     const float center_y = float(sampled_.y + int(row) - reach) + 0.5f;
-    for (uint32_t i = 0; i < count; ++i)
-        spread(first, center_x - x[i], center_y - y[i], values, i);
+    for (size_t i = first; i < first + count; ++i) {
+        const Footprint weights = footprint(center_x - x[i], center_y - y[i]);
+        if (channel_count_ == 3)
+            spread_colour(corner, weights, values, i);
+        else
+            spread(corner, weights, values, i);
+    }
 }
 
-// Adds one sample to the pixels that the filter reaches, of which the first lies (left,
-// top) from the sample.
-void FilmBlocks::spread(float *first, float left, float top, const float *const *values,
-                        uint32_t sample) {
-    constexpr int MAX_TAPS = 64;
-    const int taps = 2 * filter_.reach() + 1;
+void FilmBlocks::spread(float *corner, const Footprint &weights, const float *const *values,
+                        size_t sample) const {
     const size_t entry = channel_count_ + 1;
-    MLRT_CHECK(taps <= MAX_TAPS);
-    float weights_x[MAX_TAPS], weights_y[MAX_TAPS];
-    for (int i = 0; i < taps; ++i) {
-        weights_x[i] = filter_.weight(left + float(i));
-        weights_y[i] = filter_.weight(top + float(i));
-    }
-    for (int j = 0; j < taps; ++j) {
-        float *out = first + size_t(j) * stride_ * entry;
-        for (int i = 0; i < taps; ++i, out += entry) {
-            const float weight = weights_x[i] * weights_y[j];
+    for (int j = 0; j < weights.taps; ++j) {
+        float *out = corner + size_t(j) * stride_ * entry;
+        for (int i = 0; i < weights.taps; ++i, out += entry) {
+            const float weight = weights.columns[i] * weights.rows[j];
             out[0] += weight;
             for (uint32_t k = 0; k < channel_count_; ++k)
                 out[1 + k] = std::fma(values[k][sample], weight, out[1 + k]);
         }
+    }
+}
+
+// The same with the weight and three channels side by side: 1 * weight is exact.
+void FilmBlocks::spread_colour(float *corner, const Footprint &weights,
+                               const float *const *values, size_t sample) const {
+    const PointPacket entry(1.0f, values[0][sample], values[1][sample], values[2][sample]);
+    for (int j = 0; j < weights.taps; ++j) {
+        float *out = corner + size_t(j) * stride_ * 4;
+        for (int i = 0; i < weights.taps; ++i, out += 4)
+            store(out, fused(entry, PointPacket(weights.columns[i] * weights.rows[j]),
+                             load<PointPacket>(out)));
     }
 }
 

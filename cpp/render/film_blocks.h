@@ -1,8 +1,10 @@
-// Weighted sums of samples, accumulated in an order that nothing but the film decides.
+// Weighted sums of samples of filters wider than a pixel, accumulated in an order that
+// nothing but the film decides.
 #pragma once
 
 #include "render/filter.h"
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -22,18 +24,22 @@ public:
     const PixelRect &sampled() const { return sampled_; }
     uint32_t channel_count() const { return channel_count_; }
 
-    // Adds samples at film positions (x[i], y[i]) inside the pixel (column, row) of the
-    // sampled rectangle, with values[channel][i]. Calls for pixels of one block must not
-    // overlap in time.
-    void add(uint32_t column, uint32_t row, uint32_t count, const float *x, const float *y,
-             const float *const *values);
+    // Adds samples first to first + count - 1, at film positions (x[i], y[i]) inside the
+    // pixel (column, row) of the sampled rectangle, with values[channel][i]. Calls for
+    // pixels of one block must not overlap in time.
+    void add(uint32_t column, uint32_t row, size_t first, size_t count, const float *x,
+             const float *y, const float *const *values);
 
     // Sum of weight * value of one pixel of the crop, for each channel, and of the weights.
     float pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const;
 
 private:
-    void spread(float *first, float left, float top, const float *const *values,
-                uint32_t sample);
+    struct Footprint;
+    Footprint footprint(float left, float top) const;
+    void spread(float *corner, const Footprint &weights, const float *const *values,
+                size_t sample) const;
+    void spread_colour(float *corner, const Footprint &weights, const float *const *values,
+                       size_t sample) const;
     const float *at(uint32_t block, int column, int row) const;
 
     Film film_;

@@ -33,22 +33,6 @@ ReconstructionFilter::ReconstructionFilter(const Film &film)
     coefficients_[0] -= polynomial(radius_ * radius_);
 }
 
-// Estrin's scheme with fused operations, term by term as Dr.Jit evaluates it: the terms
-// cancel, so another order would show.
-float ReconstructionFilter::polynomial(float x) const {
-    const auto &c = coefficients_;
-    const float x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
-    const float c01 = std::fma(x, c[1], c[0]), c23 = std::fma(x, c[3], c[2]);
-    const float c45 = std::fma(x, c[5], c[4]), c67 = std::fma(x, c[7], c[6]);
-    const float c89 = std::fma(x, c[9], c[8]);
-    const float c03 = std::fma(x2, c23, c01), c47 = std::fma(x2, c67, c45);
-    return std::fma(x8, c89, std::fma(x4, c47, c03));
-}
-
-float ReconstructionFilter::weight(float x) const {
-    return std::max(polynomial(x * x), 0.0f);
-}
-
 PixelRect sampled_pixels(const Film &film, const ReconstructionFilter &filter) {
     const int border = film.sample_border ? filter.border() : 0;
     return {int(film.crop_x) - border, int(film.crop_y) - border,

@@ -1,6 +1,7 @@
 // Reconstruction filters and the pixels that are sampled for them.
 #pragma once
 
+#include "base/simd.h"
 #include "render/scene.h"
 
 #include <array>
@@ -22,11 +23,16 @@ public:
     // Pixels beside the crop whose samples reach into it (Mitsuba's border_size).
     int border() const { return border_; }
 
-    // Weight at a distance of x pixels, of any filter but the box.
-    float weight(float x) const;
+    // Weight at a distance of x pixels, of any filter but the box: of one, or of sixteen
+    // with the same bits.
+    template <typename Real>
+    Real weight(const Real &x) const {
+        return maximum(polynomial(x * x), Real(0.0f));
+    }
 
 private:
-    float polynomial(float x_squared) const;
+    template <typename Real>
+    Real polynomial(const Real &x_squared) const;
 
     bool box_;
     float radius_;
@@ -34,6 +40,19 @@ private:
     int border_ = 0;
     std::array<float, 10> coefficients_{};
 };
+
+// Estrin's scheme with fused operations, term by term as Dr.Jit evaluates it: the terms
+// cancel, so another order would show.
+template <typename Real>
+Real ReconstructionFilter::polynomial(const Real &x) const {
+    const auto c = [&](int i) { return Real(coefficients_[i]); };
+    const Real x2 = x * x, x4 = x2 * x2, x8 = x4 * x4;
+    const Real c01 = fused(x, c(1), c(0)), c23 = fused(x, c(3), c(2));
+    const Real c45 = fused(x, c(5), c(4)), c67 = fused(x, c(7), c(6));
+    const Real c89 = fused(x, c(9), c(8));
+    const Real c03 = fused(x2, c23, c01), c47 = fused(x2, c67, c45);
+    return fused(x8, c89, fused(x4, c47, c03));
+}
 
 struct PixelRect {
     int x = 0, y = 0; // on the whole film

@@ -53,6 +53,9 @@ PreparedScene::PreparedScene(SceneData scene_data)
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];
         any_shape_glows |= shape.emitter != NONE;
+        const Material material =
+            shape.material == NONE ? Material{} : data.materials[shape.material];
+        shape_colours.push_back({material.front, material.back, shape.emitter});
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 

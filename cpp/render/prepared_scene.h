@@ -3,7 +3,6 @@
 
 #include "render/camera.h"
 #include "render/distribution.h"
-#include "render/filter.h"
 #include "render/scene.h"
 
 #include <cstdint>
@@ -21,10 +20,17 @@ struct EmitterTable {
     float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
 };
 
+// What shading asks of a shape.
+struct ShapeColours {
+    Vec3f front{}, back{}; // reflectance
+    uint32_t emitter = NONE;
+};
+
 struct PreparedScene {
     SceneData data;
     ImagePlane plane;
     std::vector<uint32_t> shape_of_face;
+    std::vector<ShapeColours> shape_colours; // one a shape
     bool any_shape_glows = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely

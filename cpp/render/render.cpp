@@ -3,30 +3,36 @@
 #include "base/parallel.h"
 #include "render/work_items.h"
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <utility>
+#include <vector>
 
 namespace mlrt {
 
 namespace {
 
-// Divides one row of sums by their weights (Mitsuba's hdrfilm.cpp, develop).
-void develop_row(const FilmBlocks &blocks, const FilmChannels &channels, const Film &film,
-                 uint32_t row, RenderResult &result) {
-    std::vector<float> sums(channels.count);
-    for (uint32_t column = 0; column < film.crop_width; ++column) {
-        const float weight = blocks.pixel(column, row, sums.data());
-        const float divisor = weight == 0 ? 1.0f : weight;
-        const size_t pixel = size_t(row) * film.crop_width + column;
-        for (int k = 0; k < 3; ++k)
-            result.image[3 * pixel + k] = sums[k] / divisor;
-        if (channels.depth >= 0)
-            result.depth[pixel] = sums[channels.depth] / divisor;
-        for (int k = 0; k < 3 && channels.normal >= 0; ++k)
-            result.normal[3 * pixel + k] = sums[channels.normal + k] / divisor;
-    }
+void make_room(const RenderSettings &settings, size_t pixel_count, RenderResult &result) {
+    const AovSet &aovs = settings.aovs;
+    result.image = PixelArray<float>(3 * pixel_count);
+    result.depth = PixelArray<float>(aovs.depth ? pixel_count : 0);
+    result.normal = PixelArray<float>(aovs.normal ? 3 * pixel_count : 0);
+    result.primitive = PixelArray<int32_t>(aovs.primitive ? pixel_count : 0);
+    result.cost = PixelArray<float>(aovs.cost ? pixel_count : 0);
+    std::fill_n(result.cost.data(), result.cost.size(), 0.0f);
+}
+
+// In the order of ChannelNumbers.
+FilmTarget film_target(RenderResult &result) {
+    FilmTarget target{result.image.data(), {}};
+    if (result.depth.size() > 0)
+        target.others.push_back({result.depth.data(), 1});
+    for (int k = 0; k < 3 && result.normal.size() > 0; ++k)
+        target.others.push_back({result.normal.data() + k, 3});
+    return target;
 }
 
 } // namespace
@@ -34,24 +40,16 @@ void develop_row(const FilmBlocks &blocks, const FilmChannels &channels, const F
 bool render(const PreparedScene &scene, const RenderSettings &settings,
             RenderResult &result, const std::function<bool(float)> &cancelled) {
     const Film &film = scene.data.film;
-    const FilmChannels channels(settings.aovs);
-    FilmBlocks blocks(film, channels.count);
-    const PixelRect &sampled = blocks.sampled();
+    result = {};
+    make_room(settings, size_t(film.crop_width) * film.crop_height, result);
+    PictureFilm picture(film, settings.samples_per_pixel, film_target(result));
+    const PixelRect &sampled = picture.sampled();
     const SampleStreams streams(settings.seed, sampled.width * sampled.height,
                                 settings.samples_per_pixel);
     const uint32_t side = settings.trace.initial_tile;
     const WorkItems items(sampled, settings.samples_per_pixel, side * side);
-
-    const size_t pixel_count = size_t(film.crop_width) * film.crop_height;
-    result = {};
-    result.image.resize(3 * pixel_count);
-    result.depth.resize(settings.aovs.depth ? pixel_count : 0);
-    result.normal.resize(settings.aovs.normal ? 3 * pixel_count : 0);
-    result.primitive.resize(settings.aovs.primitive ? pixel_count : 0);
-    result.cost.resize(settings.aovs.cost ? pixel_count : 0);
-    const TileTarget target{blocks, channels,
-                            settings.aovs.primitive ? result.primitive.data() : nullptr,
-                            settings.aovs.cost ? result.cost.data() : nullptr};
+    const TileTarget target{picture, ChannelNumbers(settings.aovs), result.primitive.data(),
+                            result.cost.data()};
 
     const double all_samples =
         double(sampled.width) * sampled.height * settings.samples_per_pixel;
@@ -83,8 +81,7 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
             if (may_ask ? ask() : stop.load(std::memory_order_relaxed))
                 return;
             tile->render(group);
-            samples_done.fetch_add(uint64_t(group.pixels.size()) * group.sample_count,
-                                   std::memory_order_relaxed);
+            samples_done.fetch_add(group.ray_count(), std::memory_order_relaxed);
         });
         const std::lock_guard lock(tiles_mutex);
         idle_tiles.push_back(std::move(tile));
@@ -95,9 +92,8 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
         result.counters.primary += tile->counters().primary;
         result.counters.shadow += tile->counters().shadow;
     }
-    return parallel_for(film.crop_height, [&](uint32_t row) {
-        develop_row(blocks, channels, film, row, result);
-    });
+    return parallel_for(picture.rows_to_finish(),
+                        [&](uint32_t row) { picture.finish_row(row); });
 }
 
 } // namespace mlrt

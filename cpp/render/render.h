@@ -2,12 +2,12 @@
 #pragma once
 
 #include "mlrta/trace.h"
+#include "render/pixel_array.h"
 #include "render/prepared_scene.h"
 #include "render/tile.h"
 
 #include <cstdint>
 #include <functional>
-#include <vector>
 
 namespace mlrt {
 
@@ -20,12 +20,11 @@ struct RenderSettings {
 
 // Row by row over the crop. An auxiliary picture that was not asked for is empty.
 struct RenderResult {
-    std::vector<float> image;  // red, green, blue
-    std::vector<float> depth;  // distance from the near plane along the ray; 0 for a miss
-    std::vector<float> normal; // shading normal, three a pixel; 0 for a miss
-    std::vector<int32_t>
-        primitive;           // face that each pixel's first sample hit; -1 for a miss
-    std::vector<float> cost; // of a sample, see RayGroup: primary and shadow rays, mean
+    PixelArray<float> image;  // red, green, blue
+    PixelArray<float> depth;  // distance from the near plane along the ray; 0 for a miss
+    PixelArray<float> normal; // shading normal, three a pixel; 0 for a miss
+    PixelArray<int32_t> primitive; // face that each pixel's first sample hit; -1 for a miss
+    PixelArray<float> cost; // of a sample, see RayGroup: primary and shadow rays, mean
     RenderCounters counters;
 };
 

@@ -71,6 +71,7 @@ public:
     }
 
     uint32_t samples_per_pixel() const { return samples_per_pixel_; }
+    bool in_one_pass() const { return samples_per_pass_ == samples_per_pixel_; }
 
     struct Stream {
         uint32_t seed, index;
@@ -108,18 +109,27 @@ private:
     uint32_t samples_per_pixel_, samples_per_pass_;
 };
 
-// The first two pairs of numbers of each stream: where in its pixel a sample lies, and
-// which point of which light it takes. The loop has no branches, so compilers make vector
-// code of it.
+// What a sample takes from its stream: where in its pixel it lies, then which point of
+// which light it takes.
 struct SampleNumbers {
-    float *pixel_x, *pixel_y, *light_x, *light_y;
+    float *pixel_x, *pixel_y;
+    float *light_x = nullptr, *light_y = nullptr; // drawn if they are given
 };
 
+// The loops have no branches, so compilers make vector code of them.
 inline void draw_numbers(const uint32_t *__restrict seeds,
                          const uint32_t *__restrict indices, size_t count,
                          SampleNumbers numbers) {
     float *__restrict pixel_x = numbers.pixel_x, *__restrict pixel_y = numbers.pixel_y;
     float *__restrict light_x = numbers.light_x, *__restrict light_y = numbers.light_y;
+    if (!light_x) {
+        for (size_t i = 0; i < count; ++i) {
+            Pcg32 random = SampleStreams::Stream{seeds[i], indices[i]}.open();
+            pixel_x[i] = random.next_float();
+            pixel_y[i] = random.next_float();
+        }
+        return;
+    }
     for (size_t i = 0; i < count; ++i) {
         Pcg32 random = SampleStreams::Stream{seeds[i], indices[i]}.open();
         pixel_x[i] = random.next_float();

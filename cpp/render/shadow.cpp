@@ -2,93 +2,64 @@
 
 #include "render/shadow_offset.h"
 
+#include <algorithm>
 #include <bit>
-#include <numeric>
 
 namespace mlrt {
 
-void ShadowCandidates::reset(size_t capacity) {
-    count = 0;
-    const size_t size = capacity + PACKET_WIDTH;
-    if (ray.size() >= size)
+ShadowRays::ShadowRays(const Emitter &emitter)
+    : from_light_(emitter.type == EmitterType::point || emitter.type == EmitterType::spot),
+      light_position_(emitter.position) {}
+
+void ShadowRays::reserve(size_t size) {
+    if (ray_.size() >= size)
         return;
-    ray.resize(size);
-    emitter.resize(size);
+    size = std::max(size, 2 * ray_.size());
+    ray_.resize(size);
     for (int k = 0; k < 3; ++k) {
-        origin[k].resize(size);
-        direction[k].resize(size);
-        contribution[k].resize(size);
+        origin_[k].resize(from_light_ ? 0 : size);
+        direction_[k].resize(size);
+        light_[k].resize(size);
     }
+    t_min_.resize(size, from_light_ ? SHADOW_EPSILON : 0.0f);
+    t_max_.resize(size, from_light_ ? 1.0f : 1.0f - SHADOW_EPSILON);
+    occluded_.resize(size);
 }
 
-void ShadowCandidates::append(LaneBits lanes, const LaneArray<uint32_t> &of_ray,
-                              const LaneArray<uint32_t> &to_emitter,
-                              const Vec3<FloatPacket> &from, const Vec3<FloatPacket> &to,
-                              const Vec3<FloatPacket> &light) {
-    store_compressed(ray.data() + count, load<UIntPacket>(of_ray), lanes);
-    store_compressed(emitter.data() + count, load<UIntPacket>(to_emitter), lanes);
+void ShadowRays::append(LaneBits lanes, const UIntPacket &ray,
+                        const Vec3<FloatPacket> &from, const Vec3<FloatPacket> &to,
+                        const Vec3<FloatPacket> &light) {
+    reserve(count_ + PACKET_WIDTH);
+    store_compressed(&ray_[count_], ray, lanes);
     for (int k = 0; k < 3; ++k) {
-        store_compressed(origin[k].data() + count, from[k], lanes);
-        store_compressed(direction[k].data() + count, to[k] - from[k], lanes);
-        store_compressed(contribution[k].data() + count, light[k], lanes);
+        if (!from_light_)
+            store_compressed(&origin_[k][count_], from[k], lanes);
+        const FloatPacket way = from_light_ ? from[k] - to[k] : to[k] - from[k];
+        store_compressed(&direction_[k][count_], way, lanes);
+        store_compressed(&light_[k][count_], light[k], lanes);
     }
-    count += uint32_t(std::popcount(lanes));
+    count_ += uint32_t(std::popcount(lanes));
 }
 
-// A counting sort: it keeps the order of each emitter's candidates.
-void ShadowTracer::sort_by_emitter(const ShadowCandidates &candidates) {
-    order_.resize(candidates.count);
-    if (scene_.data.emitters.size() == 1) {
-        std::iota(order_.begin(), order_.end(), 0u);
-        return;
-    }
-    next_.assign(scene_.data.emitters.size() + 1, 0);
-    for (uint32_t i = 0; i < candidates.count; ++i)
-        ++next_[candidates.emitter[i] + 1];
-    std::partial_sum(next_.begin(), next_.end(), next_.begin());
-    for (uint32_t i = 0; i < candidates.count; ++i)
-        order_[next_[candidates.emitter[i]]++] = i;
-}
-
-void ShadowTracer::add_costs_to(const ShadowCandidates &candidates,
-                                float *of_camera_rays) const {
-    for (uint32_t i = 0; i < candidates.count; ++i)
-        of_camera_rays[candidates.ray[order_[i]]] += costs_[i];
-}
-
-void ShadowTracer::trace_group(const ShadowCandidates &candidates,
-                               std::span<const uint32_t> group, const Emitter &emitter,
-                               float *costs) {
-    const size_t count = group.size();
-    const bool from_light =
-        emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
-    const float sign = from_light ? -1.0f : 1.0f;
-    for (int k = 0; k < 3; ++k) {
-        direction_[k].resize(count);
-        for (size_t i = 0; i < count; ++i)
-            direction_[k][i] = sign * candidates.direction[k][group[i]];
-        if (from_light)
-            continue;
-        origin_[k].resize(count);
-        for (size_t i = 0; i < count; ++i)
-            origin_[k][i] = candidates.origin[k][group[i]];
-    }
-    t_min_.assign(count, from_light ? SHADOW_EPSILON : 0.0f);
-    t_max_.assign(count, from_light ? 1.0f : 1.0f - SHADOW_EPSILON);
-    occluded_.resize(count);
-
+void ShadowRays::find_occluded(const KdTree &tree, const TraceOptions &options,
+                               Counters &counters, float *cost) {
     RayGroup rays;
-    rays.count = uint32_t(count);
-    rays.has_common_origin = from_light;
-    rays.common_origin = emitter.position;
+    rays.count = count_;
+    rays.has_common_origin = from_light_;
+    rays.common_origin = light_position_;
     for (int k = 0; k < 3; ++k) {
-        rays.origin[k] = from_light ? nullptr : origin_[k].data();
+        rays.origin[k] = from_light_ ? nullptr : origin_[k].data();
         rays.direction[k] = direction_[k].data();
     }
     rays.t_min = t_min_.data();
     rays.t_max = t_max_.data();
-    rays.cost = costs;
-    trace_any(*scene_.data.tree, rays, options_, occluded_.data(), counters_);
+    if (cost) {
+        cost_.assign(count_, 0.0f);
+        rays.cost = cost_.data();
+    }
+    trace_any(tree, rays, options, occluded_.data(), counters);
+    for (uint32_t i = 0; cost && i < count_; ++i)
+        cost[ray_[i]] += cost_[i];
 }
 
 } // namespace mlrt

@@ -7,81 +7,55 @@
 #include "render/prepared_scene.h"
 
 #include <cstdint>
-#include <span>
 #include <vector>
 
 namespace mlrt {
 
-// Light that reaches points unless something is in the way. One array a component, with
-// room for a packet behind the last entry.
-struct ShadowCandidates {
-    uint32_t count = 0;
-    std::vector<uint32_t> ray; // which camera ray it is for
-    std::vector<uint32_t> emitter;
-    std::vector<float> origin[3];    // off the surface: see shadow_offset.h
-    std::vector<float> direction[3]; // to the light, or beyond the scene for one far away
-    std::vector<float> contribution[3];
-
-    // Empties the arrays and makes room for a number of entries.
-    void reset(size_t capacity);
-
-    // Adds the lanes whose bit is set.
-    void append(LaneBits lanes, const LaneArray<uint32_t> &of_ray,
-                const LaneArray<uint32_t> &to_emitter, const Vec3<FloatPacket> &from,
-                const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light);
-};
-
-// Calls visible(i) for the candidates i that nothing occludes, each emitter's in the order
-// given.
+// Light of one emitter that reaches points unless something is in the way.
 //
-// The rays of one emitter are traced as one group. For point and spot lights they start at
-// the light, so that they share an origin and form a beam; the interval leaves out the same
-// share at the light's end as in Mitsuba, where they run the other way.
-class ShadowTracer {
+// For point and spot lights shadow rays start at the light, so that they share an origin
+// and form a beam; the interval leaves out the same share at the light's end as in Mitsuba,
+// where they run the other way.
+class ShadowRays {
 public:
-    ShadowTracer(const PreparedScene &scene, const TraceOptions &options,
-                 Counters &counters)
-        : scene_(scene), options_(options), counters_(counters) {}
+    explicit ShadowRays(const Emitter &emitter);
 
+    void clear() { count_ = 0; }
+
+    // Adds the lanes whose bit is set: `light` reaches the point `from`, which lies off its
+    // surface (see shadow_offset.h), from the point `to`. `ray` is the camera ray that it
+    // is for.
+    void append(LaneBits lanes, const UIntPacket &ray, const Vec3<FloatPacket> &from,
+                const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light);
+
+    // Calls visible(ray, light) for all that nothing occludes, in the order given. What
+    // tracing takes is added to cost[ray] if `cost` is given.
     template <typename Visible>
-    void trace(const ShadowCandidates &candidates, Visible &&visible) {
-        sort_by_emitter(candidates);
-        if (keep_costs_)
-            costs_.assign(candidates.count, 0.0f);
-        for (uint32_t begin = 0; begin < candidates.count;) {
-            const uint32_t emitter = candidates.emitter[order_[begin]];
-            uint32_t end = begin;
-            while (end < candidates.count && candidates.emitter[order_[end]] == emitter)
-                ++end;
-            const std::span<const uint32_t> group(order_.data() + begin, end - begin);
-            trace_group(candidates, group, scene_.data.emitters[emitter],
-                        keep_costs_ ? costs_.data() + begin : nullptr);
-            for (size_t i = 0; i < group.size(); ++i)
-                if (!occluded_[i])
-                    visible(group[i]);
-            begin = end;
-        }
+    void trace(const KdTree &tree, const TraceOptions &options, Counters &counters,
+               float *cost, Visible &&visible) {
+        if (count_ == 0)
+            return;
+        find_occluded(tree, options, counters, cost);
+        for (uint32_t i = 0; i < count_; ++i)
+            if (!occluded_[i])
+                visible(ray_[i], Vec3f{light_[0][i], light_[1][i], light_[2][i]});
     }
 
-    // Whether trace() is to keep account of what each ray takes, and adding that to the
-    // camera rays' own.
-    void keep_costs(bool keep) { keep_costs_ = keep; }
-    void add_costs_to(const ShadowCandidates &candidates, float *of_camera_rays) const;
-
 private:
-    void sort_by_emitter(const ShadowCandidates &candidates);
-    void trace_group(const ShadowCandidates &candidates, std::span<const uint32_t> group,
-                     const Emitter &emitter, float *costs);
+    void reserve(size_t size);
+    void find_occluded(const KdTree &tree, const TraceOptions &options, Counters &counters,
+                       float *cost);
 
-    const PreparedScene &scene_;
-    const TraceOptions &options_;
-    Counters &counters_;
-    std::vector<uint32_t> order_; // of the candidates, by emitter
-    std::vector<uint32_t> next_;  // of each emitter: the next free place in order_
-    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
+    bool from_light_;
+    Vec3f light_position_;
+    uint32_t count_ = 0;
+    // One array a component, with room for a packet behind the last entry.
+    std::vector<uint32_t> ray_;
+    std::vector<float> origin_[3]; // if the rays do not start at the light
+    std::vector<float> direction_[3];
+    std::vector<float> light_[3];
+    std::vector<float> t_min_, t_max_, cost_;
     std::vector<uint8_t> occluded_;
-    bool keep_costs_ = false;
-    std::vector<float> costs_; // in the order of order_
 };
 
 } // namespace mlrt

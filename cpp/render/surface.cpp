@@ -1,24 +1,15 @@
 #include "render/surface.h"
 
 #include <algorithm>
+#include <type_traits>
 
 namespace mlrt {
 
 namespace {
 
-bool all_equal(const FaceNumbers &faces) {
-    return std::all_of(faces.begin(), faces.end(),
-                       [&](uint32_t face) { return face == faces[0]; });
-}
-
-// Side by side what three_vectors(lane) tells of each lane. Neighbours often meet the same
-// face, whose vectors are then read once.
+// Side by side what three_vectors(lane) tells of each lane.
 template <typename ThreeVectors>
-Corners<FloatPacket> gather(bool lanes_are_equal, ThreeVectors &&three_vectors) {
-    if (lanes_are_equal) {
-        const Corners<float> v = three_vectors(0);
-        return {in_all_lanes(v.a), in_all_lanes(v.b), in_all_lanes(v.c)};
-    }
+Corners<FloatPacket> gather(ThreeVectors &&three_vectors) {
     LaneArray<float> a[3], b[3], c[3];
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
         const Corners<float> v = three_vectors(lane);
@@ -34,34 +25,109 @@ Corners<FloatPacket> gather(bool lanes_are_equal, ThreeVectors &&three_vectors) 
     return {vector(a), vector(b), vector(c)};
 }
 
-bool is_interpolated(const PreparedScene &scene, uint32_t face) {
-    return scene.data.shapes[scene.shape_of_face[face]].vertex_normals;
-}
-bool any_interpolated(const PreparedScene &scene, uint32_t face) {
-    return is_interpolated(scene, face);
-}
-bool any_interpolated(const PreparedScene &scene, const FaceNumbers &faces) {
-    return std::any_of(faces.begin(), faces.end(),
-                       [&](uint32_t face) { return is_interpolated(scene, face); });
+const Shape &shape_of(const PreparedScene &scene, uint32_t face) {
+    return scene.data.shapes[scene.shape_of_face[face]];
 }
 
 // 1, or -1 where the normals of the shape are turned.
-float facing(const PreparedScene &scene, uint32_t face) {
-    return scene.data.shapes[scene.shape_of_face[face]].flip_normals ? -1.0f : 1.0f;
+float facing(const Shape &shape) {
+    return shape.flip_normals ? -1.0f : 1.0f;
 }
-FloatPacket facing(const PreparedScene &scene, const FaceNumbers &faces) {
-    LaneArray<float> signs;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-        signs[lane] = facing(scene, faces[lane]);
-    return load<FloatPacket>(signs);
+
+template <typename Real, typename Corner>
+Vec3<Real> interpolate(const Corners<Corner> &v, const Real &wa, const Real &wb,
+                       const Real &wc) {
+    Vec3<Real> mean;
+    for (int k = 0; k < 3; ++k)
+        mean[k] = fused(Real(v.a[k]), wa, fused(Real(v.b[k]), wb, Real(v.c[k]) * wc));
+    return mean;
+}
+
+// In double precision, where the product of tiny edges does not vanish.
+template <typename Real>
+Vec3<Real> face_normal_of(const Corners<Real> &corners) {
+    const auto a = to_double(corners.a);
+    const auto normal =
+        normalize(cross(to_double(corners.b) - a, to_double(corners.c) - a));
+    return {Real(normal.x), Real(normal.y), Real(normal.z)};
+}
+
+// Of faces without normals of their vertices, and not turned (Mitsuba 3.9's mesh.cpp,
+// compute_surface_interaction). Corner is float if all rays meet the same face.
+template <typename Real, typename Corner>
+SurfacePoint<Real> on_face(const Vec2<Real> &at, const Corners<Corner> &corners) {
+    SurfacePoint<Real> point;
+    const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
+    point.p = interpolate<Real>(corners, w0, w1, w2);
+    point.face_normal = Vec3<Real>(face_normal_of(corners));
+    point.shading_normal = point.face_normal;
+    return point;
+}
+
+template <typename Real, typename Corner>
+Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Corner> &n,
+                               const Vec3<Real> &face_normal) {
+    const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
+    const Vec3<Real> mean = interpolate<Real>(Corners<Corner>{n.c, n.b, n.a}, w2, w1, w0);
+    // Opposite vertex normals can cancel; the face normal is then as good as any.
+    const MaskOf<Real> has_direction = dot(mean, mean) > Real(0.0f);
+    const Vec3<Real> unit = normalize(mean);
+    Vec3<Real> normal;
+    for (int k = 0; k < 3; ++k)
+        normal[k] = select(has_direction, unit[k], face_normal[k]);
+    return normal;
 }
 
 template <typename Real>
-Vec3<Real> interpolate(const Vec3<Real> &a, const Vec3<Real> &b, const Vec3<Real> &c,
-                       const Real &wa, const Real &wb, const Real &wc) {
-    return {fused(a.x, wa, fused(b.x, wb, c.x * wc)),
-            fused(a.y, wa, fused(b.y, wb, c.y * wc)),
-            fused(a.z, wa, fused(b.z, wb, c.z * wc))};
+void turn(SurfacePoint<Real> &point, const Real &sign) {
+    point.face_normal = sign * point.face_normal;
+    point.shading_normal = sign * point.shading_normal;
+}
+
+template <typename Real, typename Origin>
+SurfacePoint<Real> on_one_face(const PreparedScene &scene, const Vec3<Origin> &origin,
+                               const Vec3<Real> &direction, uint32_t face) {
+    const Shape &shape = shape_of(scene, face);
+    const Corners<float> corners = corners_of(scene, face);
+    const Vec2<Real> at = barycentrics_of(origin, direction, corners);
+    SurfacePoint<Real> point = on_face(at, corners);
+    if (shape.vertex_normals)
+        point.shading_normal =
+            interpolated_normal(at, normals_of(scene, face), point.face_normal);
+    turn(point, Real(facing(shape)));
+    return point;
+}
+
+template <typename Origin>
+SurfacePoint<FloatPacket> on_faces(const PreparedScene &scene, const Vec3<Origin> &origin,
+                                   const Vec3<FloatPacket> &direction,
+                                   const FaceNumbers &faces) {
+    const Corners<FloatPacket> corners = corners_of(scene, faces);
+    const Vec2<FloatPacket> at = barycentrics_of(origin, direction, corners);
+    SurfacePoint<FloatPacket> point = on_face(at, corners);
+    LaneArray<float> signs;
+    LaneBits interpolated = 0;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const Shape &shape = shape_of(scene, faces[lane]);
+        signs[lane] = facing(shape);
+        interpolated |= LaneBits(shape.vertex_normals) << lane;
+    }
+    if (interpolated != 0)
+        point.shading_normal =
+            interpolated_normal(at, normals_of(scene, faces), point.face_normal);
+    turn(point, load<FloatPacket>(signs));
+    return point;
+}
+
+void replace(SurfacePoint<FloatPacket> &point, LaneBits lanes,
+             const SurfacePoint<FloatPacket> &by) {
+    const auto mask = from_bits<FloatPacket>(lanes);
+    for (int k = 0; k < 3; ++k) {
+        point.p[k] = select(mask, by.p[k], point.p[k]);
+        point.face_normal[k] = select(mask, by.face_normal[k], point.face_normal[k]);
+        point.shading_normal[k] =
+            select(mask, by.shading_normal[k], point.shading_normal[k]);
+    }
 }
 
 } // namespace
@@ -72,12 +138,11 @@ Corners<float> corners_of(const PreparedScene &scene, uint32_t face) {
 }
 
 Corners<FloatPacket> corners_of(const PreparedScene &scene, const FaceNumbers &faces) {
-    return gather(all_equal(faces),
-                  [&](uint32_t lane) { return corners_of(scene, faces[lane]); });
+    return gather([&](uint32_t lane) { return corners_of(scene, faces[lane]); });
 }
 
 Corners<float> normals_of(const PreparedScene &scene, uint32_t face) {
-    if (!is_interpolated(scene, face))
+    if (!shape_of(scene, face).vertex_normals)
         return {};
     const auto &[a, b, c] = scene.data.faces[face];
     const std::vector<Vec3f> &normals = scene.data.normals;
@@ -85,47 +150,48 @@ Corners<float> normals_of(const PreparedScene &scene, uint32_t face) {
 }
 
 Corners<FloatPacket> normals_of(const PreparedScene &scene, const FaceNumbers &faces) {
-    return gather(all_equal(faces),
-                  [&](uint32_t lane) { return normals_of(scene, faces[lane]); });
+    return gather([&](uint32_t lane) { return normals_of(scene, faces[lane]); });
 }
 
-// Mitsuba 3.9's mesh.cpp, compute_surface_interaction.
-template <typename Real>
-SurfacePoint<Real> hit_surface(const PreparedScene &scene, const Vec3<Real> &origin,
-                               const Vec3<Real> &direction, const FacesOf<Real> &faces) {
-    const Corners<Real> corners = corners_of(scene, faces);
-    const Vec2<Real> at = barycentrics_of(origin, direction, corners);
-    const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
-    SurfacePoint<Real> point;
-    point.p = interpolate(corners.a, corners.b, corners.c, w0, w1, w2);
+SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
+                                uint32_t face) {
+    return on_one_face(scene, origin, direction, face);
+}
 
-    // In double precision, where the product of tiny edges does not vanish.
-    const auto a = to_double(corners.a);
-    const auto normal =
-        normalize(cross(to_double(corners.b) - a, to_double(corners.c) - a));
-    point.face_normal = {Real(normal.x), Real(normal.y), Real(normal.z)};
-    point.shading_normal = point.face_normal;
-    if (any_interpolated(scene, faces)) {
-        const Corners<Real> n = normals_of(scene, faces);
-        const Vec3<Real> mean = interpolate(n.c, n.b, n.a, w2, w1, w0);
-        // Opposite vertex normals can cancel; the face normal is then as good as any.
-        const MaskOf<Real> has_direction = dot(mean, mean) > Real(0.0f);
-        const Vec3<Real> unit = normalize(mean);
-        for (int k = 0; k < 3; ++k)
-            point.shading_normal[k] =
-                select(has_direction, unit[k], point.shading_normal[k]);
+template <typename Origin>
+SurfacePoint<FloatPacket>
+hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
+             const Vec3<FloatPacket> &direction, const UIntPacket &faces, LaneBits lanes) {
+    // Neighbours mostly meet the same few faces, which are then read once, and whose part
+    // of the work is done once if the origin is the same too.
+    constexpr uint32_t FEW = 4; // chosen
+    SurfacePoint<FloatPacket> point;
+    LaneBits left = lanes;
+    for (uint32_t n = 0; n < FEW && left != 0; ++n) {
+        const uint32_t face = lane_of(faces, uint32_t(__builtin_ctz(left)));
+        const LaneBits served = left & to_bits(faces == UIntPacket(face));
+        const SurfacePoint<FloatPacket> part = on_one_face(scene, origin, direction, face);
+        if (n == 0)
+            point = part;
+        else
+            replace(point, served, part);
+        left &= ~served;
     }
-    const Real sign = facing(scene, faces);
-    point.face_normal = sign * point.face_normal;
-    point.shading_normal = sign * point.shading_normal;
+    if (left != 0) {
+        FaceNumbers numbers = to_lanes<uint32_t>(faces);
+        const uint32_t any = numbers[uint32_t(__builtin_ctz(left))];
+        for_each_lane(ALL_LANES & ~left, [&](uint32_t lane) { numbers[lane] = any; });
+        replace(point, left, on_faces(scene, origin, direction, numbers));
+    }
     return point;
 }
 
-template SurfacePoint<float> hit_surface(const PreparedScene &, const Vec3f &,
-                                         const Vec3f &, const uint32_t &);
-template SurfacePoint<FloatPacket> hit_surface(const PreparedScene &,
-                                               const Vec3<FloatPacket> &,
-                                               const Vec3<FloatPacket> &,
-                                               const FaceNumbers &);
+template SurfacePoint<FloatPacket> hit_surfaces(const PreparedScene &, const Vec3f &,
+                                                const Vec3<FloatPacket> &,
+                                                const UIntPacket &, LaneBits);
+template SurfacePoint<FloatPacket> hit_surfaces(const PreparedScene &,
+                                                const Vec3<FloatPacket> &,
+                                                const Vec3<FloatPacket> &,
+                                                const UIntPacket &, LaneBits);
 
 } // namespace mlrt

@@ -7,15 +7,11 @@
 #include "render/prepared_scene.h"
 
 #include <cstdint>
-#include <type_traits>
 
 namespace mlrt {
 
-// The faces of a packet; lanes that hit nothing hold any face.
+// The faces of a packet.
 using FaceNumbers = LaneArray<uint32_t>;
-
-template <typename Real>
-using FacesOf = std::conditional_t<std::is_same_v<Real, float>, uint32_t, FaceNumbers>;
 
 template <typename Real>
 struct SurfacePoint {
@@ -25,9 +21,15 @@ struct SurfacePoint {
 };
 
 // The surface that a ray is known to hit.
-template <typename Real>
-SurfacePoint<Real> hit_surface(const PreparedScene &scene, const Vec3<Real> &origin,
-                               const Vec3<Real> &direction, const FacesOf<Real> &faces);
+SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
+                                uint32_t face);
+
+// The same for the given lanes of sixteen rays with one origin (Origin is float) or an
+// origin each (FloatPacket); the other lanes get any values.
+template <typename Origin>
+SurfacePoint<FloatPacket>
+hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
+             const Vec3<FloatPacket> &direction, const UIntPacket &faces, LaneBits lanes);
 
 Corners<float> corners_of(const PreparedScene &scene, uint32_t face);
 Corners<FloatPacket> corners_of(const PreparedScene &scene, const FaceNumbers &faces);

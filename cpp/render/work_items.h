@@ -2,7 +2,7 @@
 #pragma once
 
 #include "render/film_blocks.h"
-#include "render/tile.h"
+#include "render/pixel_group.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -27,11 +27,13 @@ public:
     // Calls visit(group) for each group of an item, in order.
     template <typename Visit>
     void for_each_group(uint32_t item, Visit &&visit) const {
-        PixelGroup group;
-        for (uint32_t code = 0; code < side_ * side_; code += group_side_ * group_side_) {
-            collect_pixels(item, code, group);
-            for (uint32_t first = 0; first < samples_ && !group.pixels.empty();
-                 first += group_samples_) {
+        std::vector<Pixel> clipped;
+        const uint32_t groups = (side_ / group_side_) * (side_ / group_side_);
+        for (uint32_t i = 0; i < groups; ++i) {
+            PixelGroup group = group_at(item, i, clipped);
+            if (group.offsets.empty())
+                continue;
+            for (uint32_t first = 0; first < samples_; first += group_samples_) {
                 group.first_sample = first;
                 group.sample_count = std::min(group_samples_, samples_ - first);
                 visit(group);
@@ -40,7 +42,9 @@ public:
     }
 
 private:
-    void collect_pixels(uint32_t item, uint32_t first_code, PixelGroup &group) const;
+    // Without samples as yet. Those that the edge of the picture cuts keep their pixels in
+    // `clipped`.
+    PixelGroup group_at(uint32_t item, uint32_t number, std::vector<Pixel> &clipped) const;
 
     uint32_t width_, height_;
     uint32_t samples_;
@@ -48,6 +52,7 @@ private:
     uint32_t group_samples_ = 1; // fewer than samples_ only if group_side_ is 1
     uint32_t side_ = FilmBlocks::BLOCK_SIZE;
     uint32_t across_ = 0, down_ = 0;
+    std::vector<Pixel> square_; // offsets of the pixels of a whole group
 };
 
 } // namespace mlrt

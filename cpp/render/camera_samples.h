@@ -1,0 +1,60 @@
+// The camera rays of a group of pixels, and the random numbers of their samples.
+#pragma once
+
+#include "render/filter.h"
+#include "render/pixel_group.h"
+#include "render/prepared_scene.h"
+#include "render/sampler.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace mlrt {
+
+class CameraSamples {
+public:
+    // Which numbers are wanted besides those that make the rays.
+    struct Wanted {
+        bool film_positions = false, light_numbers = false;
+    };
+
+    CameraSamples(const PreparedScene &scene, const SampleStreams &streams,
+                  const PixelRect &sampled, Wanted wanted);
+
+    void generate(const PixelGroup &group);
+
+    // Arrays of one entry a ray, in the order of the group, and of whole packets; entries
+    // behind the last ray are rays of some pixel of the group.
+    size_t count() const { return count_; }
+    size_t padded_count() const { return t_min_.size(); }
+    const float *direction(int axis) const { return direction_[axis].data(); }
+    const float *t_min() const { return t_min_.data(); }
+    const float *t_max() const { return t_max_.data(); }
+    // Positions on the film, and numbers in [0, 1): any value if they are not wanted.
+    const float *film_x() const { return film_x_.data(); }
+    const float *film_y() const { return film_y_.data(); }
+    const float *light_x() const { return light_x_.data(); }
+    const float *light_y() const { return light_y_.data(); }
+
+private:
+    void lay_out(const PixelGroup &group);
+    void choose_streams(const PixelGroup &group);
+
+    const PreparedScene &scene_;
+    const SampleStreams &streams_;
+    PixelRect sampled_;
+    Wanted wanted_;
+    size_t count_ = 0;
+
+    // Of the group's corner, where the rays lie: kept for the groups to come, which mostly
+    // are squares of the same size.
+    uint32_t side_ = 0, sample_count_ = 0;
+    std::vector<float> column_, row_;
+    std::vector<uint32_t> first_stream_;
+
+    std::vector<uint32_t> seed_, stream_;
+    std::vector<float> film_x_, film_y_, light_x_, light_y_;
+    std::vector<float> direction_[3], t_min_, t_max_;
+};
+
+} // namespace mlrt

@@ -1,0 +1,84 @@
+#include "render/picture_film.h"
+
+#include <utility>
+
+namespace mlrt {
+
+PictureFilm::PictureFilm(const Film &film, uint32_t samples_per_pixel, FilmTarget target)
+    : film_(film), samples_per_pixel_(samples_per_pixel), target_(std::move(target)) {
+    const ReconstructionFilter filter(film);
+    sampled_ = sampled_pixels(film, filter);
+    if (!filter.is_box())
+        blocks_.emplace(film, channel_count());
+    for (uint32_t column = 0; column < column_codes_.size(); ++column)
+        column_codes_[column] = morton_code({column, 0});
+}
+
+void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
+                      const float *const *values) {
+    if (!blocks_) {
+        if (samples_per_pixel_ == 1)
+            write_pixels(group, values);
+        else
+            add_whole_pixels(group, values);
+        return;
+    }
+    for (size_t i = 0; i < group.offsets.size(); ++i) {
+        const Pixel pixel = group.pixel(i);
+        blocks_->add(pixel.column, pixel.row, i * group.sample_count, group.sample_count, x,
+                     y, values);
+    }
+}
+
+// With a box filter the sampled rectangle is the crop. Squares are written row by row:
+// rows may lie so far apart that a cache keeps only a few of them at once.
+void PictureFilm::write_pixels(const PixelGroup &group, const float *const *values) {
+    const float *red = values[0], *green = values[1], *blue = values[2];
+    const auto write = [&](float *out, size_t ray) {
+        out[0] = red[ray];
+        out[1] = green[ray];
+        out[2] = blue[ray];
+    };
+    for (uint32_t row = 0; row < group.side; ++row) {
+        float *out = target_.image + COLOURS * number_of({group.left, group.top + row});
+        const uint32_t of_row = morton_code({0, row});
+        for (uint32_t column = 0; column < group.side; ++column, out += COLOURS)
+            write(out, of_row | column_codes_[column]);
+    }
+    if (group.side == 0)
+        for (size_t i = 0; i < group.offsets.size(); ++i)
+            write(target_.image + COLOURS * number_of(group.pixel(i)), i);
+    for (uint32_t k = COLOURS; k < channel_count(); ++k)
+        for (size_t i = 0; i < group.offsets.size(); ++i)
+            channel(k, number_of(group.pixel(i))) = values[k][i];
+}
+
+// A pixel whose samples come in several groups keeps their sum until the last one.
+void PictureFilm::add_whole_pixels(const PixelGroup &group, const float *const *values) {
+    const bool first = group.first_sample == 0;
+    const bool last = group.first_sample + group.sample_count == samples_per_pixel_;
+    const float divisor = last ? float(samples_per_pixel_) : 1.0f;
+    for (uint32_t k = 0; k < channel_count(); ++k) {
+        const float *value = values[k];
+        for (size_t i = 0; i < group.offsets.size(); ++i) {
+            float &out = channel(k, number_of(group.pixel(i)));
+            float sum = first ? 0.0f : out;
+            for (uint32_t sample = 0; sample < group.sample_count; ++sample)
+                sum += *value++;
+            out = sum / divisor;
+        }
+    }
+}
+
+// Divides the sums by their weights (Mitsuba's hdrfilm.cpp, develop).
+void PictureFilm::finish_row(uint32_t row) {
+    std::vector<float> sums(channel_count());
+    for (uint32_t column = 0; column < film_.crop_width; ++column) {
+        const float weight = blocks_->pixel(column, row, sums.data());
+        const float divisor = weight == 0 ? 1.0f : weight;
+        for (uint32_t k = 0; k < channel_count(); ++k)
+            channel(k, size_t(row) * film_.crop_width + column) = sums[k] / divisor;
+    }
+}
+
+} // namespace mlrt
