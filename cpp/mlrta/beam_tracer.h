@@ -90,8 +90,12 @@ private:
             output_.set(packet.first_ray, packet.found);
             left &= ~packet.found;
         } else if (done && packet.found != 0) {
-            output_.set(packet.first_ray, packet.found,
-                        hit_distances(tree_, rays_, packet, counters_), packet.primitive);
+            if (output_.wants_distances())
+                output_.set(packet.first_ray, packet.found,
+                            hit_distances(tree_, rays_, packet, counters_),
+                            packet.primitive);
+            else
+                output_.set(packet.first_ray, packet.found, packet.primitive);
         }
         if (left != 0)
             packets_.trace_lanes(packet.first_ray, left, frontier);
@@ -146,7 +150,7 @@ private:
     void trace_regrouped(RegroupedRays &part, const Frontier &frontier, bool ordered) {
         const RayGroup group = part.group(rays_);
         typename Output::Buffer buffer;
-        Output output = buffer.output();
+        Output output = output_.into(buffer);
         output.clear(part.count);
         BeamTracer(tree_, group, options_, nullptr, output, counters_, experience_)
             .trace_beam(0, part.count, frontier, ordered);

@@ -16,12 +16,15 @@ struct ClosestOutput {
     static constexpr Query query = Query::closest;
     HitGroup hits;
 
+    bool wants_distances() const { return hits.t != nullptr; }
     void clear(uint32_t count) {
-        std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
+        if (wants_distances())
+            std::fill_n(hits.t, count, std::numeric_limits<float>::infinity());
         std::fill_n(hits.primitive, count, NO_PRIMITIVE);
     }
     void set(uint32_t ray, const Hit &hit) {
-        hits.t[ray] = hit.t;
+        if (wants_distances())
+            hits.t[ray] = hit.t;
         hits.primitive[ray] = hit.primitive;
     }
     void set(uint32_t first, LaneBits lanes, const PacketState<query> &state) {
@@ -29,31 +32,40 @@ struct ClosestOutput {
     }
     void set(uint32_t first, LaneBits lanes, const FloatPacket &t,
              const UIntPacket &primitive) {
-        if (lanes == ALL_LANES) {
-            store(hits.t + first, t);
-            store(hits.primitive + first, primitive);
-            return;
-        }
-        const LaneArray<float> distances = to_lanes<float>(t);
-        const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitive);
-        for_each_lane(lanes, [&](uint32_t lane) {
-            hits.t[first + lane] = distances[lane];
-            hits.primitive[first + lane] = numbers[lane];
-        });
+        set(first, lanes, primitive);
+        if (wants_distances())
+            set_lanes(hits.t + first, lanes, t);
+    }
+    // Without distances, where they are not wanted.
+    void set(uint32_t first, LaneBits lanes, const UIntPacket &primitive) {
+        set_lanes(hits.primitive + first, lanes, primitive);
     }
 
     // Room for the answers of rays that were regrouped.
     struct Buffer {
         std::array<float, BeamPackets::MAX_RAYS> t;
         std::array<uint32_t, BeamPackets::MAX_RAYS> primitive;
-
-        ClosestOutput output() { return {{t.data(), primitive.data()}}; }
     };
+    ClosestOutput into(Buffer &buffer) const {
+        return {{wants_distances() ? buffer.t.data() : nullptr, buffer.primitive.data()}};
+    }
     void set(const RegroupedRays &rays, const Buffer &buffer) {
         for (uint32_t i = 0; i < rays.count; ++i) {
-            hits.t[rays.number[i]] = buffer.t[i];
+            if (wants_distances())
+                hits.t[rays.number[i]] = buffer.t[i];
             hits.primitive[rays.number[i]] = buffer.primitive[i];
         }
+    }
+
+private:
+    template <typename Value, typename Packet>
+    static void set_lanes(Value *values, LaneBits lanes, const Packet &packet) {
+        if (lanes == ALL_LANES) {
+            store(values, packet);
+            return;
+        }
+        const LaneArray<Value> from = to_lanes<Value>(packet);
+        for_each_lane(lanes, [&](uint32_t lane) { values[lane] = from[lane]; });
     }
 };
 
@@ -74,9 +86,8 @@ struct AnyOutput {
 
     struct Buffer {
         std::array<uint8_t, BeamPackets::MAX_RAYS> occluded;
-
-        AnyOutput output() { return {occluded.data()}; }
     };
+    AnyOutput into(Buffer &buffer) const { return {buffer.occluded.data()}; }
     void set(const RegroupedRays &rays, const Buffer &buffer) {
         for (uint32_t i = 0; i < rays.count; ++i)
             occluded[rays.number[i]] = buffer.occluded[i];

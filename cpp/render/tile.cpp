@@ -98,7 +98,9 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     tile.size = group.side;
     tile.samples = group.sample_count;
     const bool is_square = group.side > 0 && x >= 0 && y >= 0;
-    trace_closest(*scene_.data.tree, rays, options_, HitGroup{t_.data(), primitive_.data()},
+    const bool wants_distances = target_.channels.depth >= 0;
+    trace_closest(*scene_.data.tree, rays, options_,
+                  HitGroup{wants_distances ? t_.data() : nullptr, primitive_.data()},
                   counters_.primary, is_square ? &tile : nullptr);
 }
 
@@ -220,7 +222,6 @@ void TileRenderer::pass_hidden_emitters() {
                 d[k].push_back(samples_.direction(k)[ray]);
         const std::vector<float> t_min(count, 0.0f);
         const std::vector<float> t_max(count, std::numeric_limits<float>::max());
-        std::vector<float> t(count);
         std::vector<uint32_t> primitive(count);
 
         RayGroup group;
@@ -232,7 +233,7 @@ void TileRenderer::pass_hidden_emitters() {
         group.t_min = t_min.data();
         group.t_max = t_max.data();
         trace_closest(*scene_.data.tree, group, options_,
-                      HitGroup{t.data(), primitive.data()}, counters_.primary);
+                      HitGroup{nullptr, primitive.data()}, counters_.primary);
         for (size_t first = 0; first < count; first += PACKET_WIDTH)
             shade_passed(passing, primitive, first);
     }

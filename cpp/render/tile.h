@@ -102,7 +102,7 @@ private:
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.
-    std::vector<float> t_;
+    std::vector<float> t_; // if the depth is wanted
     std::vector<uint32_t> primitive_;
     std::vector<float> cost_;                // if it is wanted
     std::vector<std::vector<float>> values_; // by channel of the film

@@ -38,7 +38,8 @@ struct RayGroup {
     float *cost = nullptr;
 };
 
-// Nearest hits: t and the number of the triangle, or infinity and NO_PRIMITIVE.
+// Nearest hits: t and the number of the triangle, or infinity and NO_PRIMITIVE. Where t is
+// not given nobody asks how far they are.
 struct HitGroup {
     float *t = nullptr;
     uint32_t *primitive = nullptr;
