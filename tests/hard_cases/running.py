@@ -60,7 +60,9 @@ class Expected:
 
 def expected_hits(case: HardCase, rays: RaySet) -> Expected:
     """The exact hits; they must be those that were told by hand."""
-    hits = oracles.Soup(*case.scene).hits(*rays.rays, rays.t_min, rays.t_max)
+    # What lies behind the origin does not count, whatever t_min is.
+    t_min = np.maximum(np.asarray(rays.t_min, np.float32), np.float32(0))
+    hits = oracles.Soup(*case.scene).hits(*rays.rays, t_min, rays.t_max)
     face = np.array([-1 if hit is None else hit.face for hit in hits])
     t = np.array([math.inf if hit is None else hit.t for hit in hits], np.float32)
     if rays.faces is not None:

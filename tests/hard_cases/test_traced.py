@@ -5,13 +5,13 @@ from __future__ import annotations
 from types import ModuleType
 
 import pytest
-from hard_cases import directions, edges, split_planes
+from hard_cases import directions, edges, places, split_planes, unusual_geometry
 from hard_cases.case import CASES, Listed
 from hard_cases.running import check
 from kd_trees import each_builder
 from tracing import each_core
 
-FAMILIES = (directions, edges, split_planes)
+FAMILIES = (directions, edges, places, split_planes, unusual_geometry)
 
 
 @each_core
