@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +79,20 @@ def case(number: int) -> Callable[[Callable[[], HardCase]], Callable[[], HardCas
         return make
 
     return enlist
+
+
+Test = TypeVar("Test", bound=Callable[..., None])
+
+
+def covers(number: int) -> Callable[[Test], Test]:
+    """Marks a test of a case that takes more than tracing rays; its docstring says why the
+    case is hard."""
+
+    def marked(test: Test) -> Test:
+        assert test.__doc__, f"case {number} does not say why it is hard"
+        return test
+
+    return marked
 
 
 def generator() -> np.random.Generator:

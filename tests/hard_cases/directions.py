@@ -8,7 +8,7 @@ import math
 import numpy as np
 import workloads
 
-from .case import HardCase, RaySet, along, case, generator, rows
+from .case import HardCase, RaySet, along, case, generator, rows, triangles
 
 SIGNS = rows(*(s for s in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(s)))
 """The 26 directions to the neighbours of a cube."""
@@ -135,5 +135,32 @@ def direction_of_no_length() -> HardCase:
             "from many": RaySet(along(inside, directions)),
             "on a face": RaySet(along(on_side, directions)),
             "nothing else": RaySet(along(inside[:20], zeros), -1),
+        },
+    )
+
+
+@case(36)
+def edge_on_the_border_of_a_tile() -> HardCase:
+    """The triangle covers all of a tile but for the rays on its border, which may be on the
+    triangle's edge or just beside it: it must not be taken to stop them all."""
+    # Four tiles of 16 rays in rows, of which column 4 has x = 0 and column 12 x = 1.
+    column = np.arange(-4, 12) / 8
+    x, y = (axis.ravel() for axis in np.meshgrid(column, column))
+    directions = np.stack([x, y, np.ones(256)], axis=1)
+    rng = generator()
+    # Edges at x = 0, and one float to either side of it.
+    beside = np.float32(2.0**-24)
+    scene = triangles(
+        ((0, -64, 2), (0, 64, 2), (64, 0, 2)),
+        ((beside, -64, 1), (beside, 64, 1), (-64, 0, 1)),
+        ((-64, -64, 3), (64, -64, 3), (0, 64, 3)),
+    )
+    apart = workloads.snap(rng.uniform(-1, 1, (256, 3))) * np.float32([1, 1, 0.5])
+    return HardCase(
+        scene,
+        {
+            "from one point": RaySet(along((0, 0, 0), directions)),
+            "from the side": RaySet(along((-0.5, 0, 0.5), directions)),
+            "from many": RaySet(along(apart, directions)),
         },
     )

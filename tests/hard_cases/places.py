@@ -47,6 +47,25 @@ def origin_on_a_triangle() -> HardCase:
     )
 
 
+@case(12)
+def scaled_by_powers_of_two() -> HardCase:
+    """At 2^-60 squares are denormal, at 2^60 their squares overflow."""
+    vertices, faces = workloads.sphere(2)
+    small = (vertices * np.float32(2.0**-60)).astype(np.float32)
+    rng = generator()
+    origins = (workloads.snap(rng.uniform(-0.3, 0.3, (300, 3))) * 2.0**-60).astype(
+        np.float32
+    )
+    targets = rng.choice(small, 300)
+    return HardCase(
+        (small, faces),
+        {
+            "from one point": RaySet(towards(origins[0], targets), every_ray_hits=True),
+            "from many": RaySet(towards(origins, targets), every_ray_hits=True),
+        },
+    )
+
+
 @case(11)
 def far_from_the_origin() -> HardCase:
     """At 10^6 coordinates are multiples of 1/16: triangles of size 1 are warped, and

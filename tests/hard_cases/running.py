@@ -39,6 +39,7 @@ WAYS: dict[str, Options] = {
             "interval",
             "adaptive",
             "beam_leaf",
+            "no covering triangles",
             "all of the paper",
         )
     },
@@ -46,7 +47,7 @@ WAYS: dict[str, Options] = {
 """X0 to X4, from the root and from entry points."""
 
 WIDTHS = (1, 8, 16)
-GROUPS = 8
+GROUPS = 4
 """Calls of each width, spread over the rays of a set."""
 
 
