@@ -119,7 +119,7 @@ def test_a_cast_shadow_at_any_scale(size: float) -> None:
     # At borders of the shadow a rounding decides: at most a few pixels.
     assert np.count_nonzero((before == 0) != (after == 0)) <= 2
     lit = same & (before > 0) & (after > 0)
-    np.testing.assert_allclose(after[lit], before[lit], rtol=1e-4)
+    np.testing.assert_allclose(after[lit], before[lit], rtol=1e-5)
 
 
 @covers(33)
