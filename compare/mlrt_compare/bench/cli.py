@@ -130,8 +130,8 @@ def make_parser() -> Parser:
         "--meshes",
         type=names,
         metavar="A,B",
-        help="sphere, slivers, bunny, dragon, one of them followed by ' at 10^6', or an XML "
-        "file (all usual ones)",
+        help="sphere, slivers, bunny, dragon, one of them with ' at 10^6' added, or an "
+        "XML file (all usual ones)",
     )
     return parser
 
