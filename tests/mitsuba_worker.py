@@ -101,6 +101,28 @@ def image_block(
     return block.tensor()
 
 
+def nearest_hits(folder: Path, arrays: str, robust: bool) -> Any:
+    """What Mitsuba's Embree hits of one mesh: shape (2, N), distances (inf) and faces (-1).
+
+    arrays: an .npz file of vertices, faces, origins and directions.
+    """
+    import mitsuba as mi
+
+    given = np.load(arrays)
+    mesh = mi.Mesh("mesh", len(given["vertices"]), len(given["faces"]))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = given["vertices"].ravel()
+    parameters["faces"] = given["faces"].ravel()
+    parameters.update()
+    scene = mi.load_dict(
+        {"type": "scene", "mesh": mesh, "embree_use_robust_intersections": robust}
+    )
+    o, d = (np.ascontiguousarray(given[name].T) for name in ("origins", "directions"))
+    hits = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(o), mi.Vector3f(d)))
+    valid = np.array(hits.is_valid())
+    return np.where(valid, [np.array(hits.t), np.array(hits.prim_index)], [[np.inf], [-1]])
+
+
 def main(folder: Path) -> None:
     from mlrt_compare import llvm
 
@@ -115,7 +137,12 @@ def main(folder: Path) -> None:
         print(" ".join(str(error).split()), file=answers, flush=True)
         return
     print(READY, file=answers, flush=True)
-    functions = {"render": render, "sampler": sampler, "image_block": image_block}
+    functions = {
+        "render": render,
+        "sampler": sampler,
+        "image_block": image_block,
+        "nearest_hits": nearest_hits,
+    }
     for number, line in enumerate(sys.stdin):
         name, arguments = json.loads(line)
         path = folder / f"reference-{number}.npy"

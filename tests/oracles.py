@@ -202,8 +202,12 @@ class Soup:
             safe = np.array(traceable)[:, None]
             possible = safe & self.candidates(np.where(safe, o, 0), np.where(safe, d, 0))
             for i, row in enumerate(possible):
-                faces = np.flatnonzero(row)
-                found = [(int(face), self.meet(o[i], d[i], int(face))) for face in faces]
+                found = []
+                if row.any():
+                    ray = to_point(o[i]), to_point(d[i])
+                    for face in np.flatnonzero(row).tolist():
+                        a, b, c = (self.points[j] for j in self.faces[face].tolist())
+                        found.append((face, meet(*ray, a, b, c)))
                 yield [Crossing(face, t) for face, t in found if t is not None]
 
     def hits(

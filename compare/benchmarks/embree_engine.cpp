@@ -48,14 +48,15 @@ bool EmbreeDevice::count_bytes(void *self, ssize_t bytes, bool) {
     return true;
 }
 
-EmbreeScene::EmbreeScene(EmbreeDevice &device, const Mesh &mesh, RTCBuildQuality quality) {
+EmbreeScene::EmbreeScene(EmbreeDevice &device, const Mesh &mesh, RTCBuildQuality quality,
+                         RTCSceneFlags flags) {
     const int64_t before = device.bytes();
     device.forget_peak();
     const FlushDenormals flush;
     const Stopwatch watch;
     handle_ = rtcNewScene(device.handle());
     rtcSetSceneBuildQuality(handle_, quality);
-    rtcSetSceneFlags(handle_, RTC_SCENE_FLAG_NONE);
+    rtcSetSceneFlags(handle_, flags);
     const RTCGeometry geometry =
         rtcNewGeometry(device.handle(), RTC_GEOMETRY_TYPE_TRIANGLE);
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,

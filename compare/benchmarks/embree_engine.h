@@ -54,7 +54,8 @@ private:
 // A committed scene over a mesh, which must outlive it.
 class EmbreeScene {
 public:
-    EmbreeScene(EmbreeDevice &device, const Mesh &mesh, RTCBuildQuality quality);
+    EmbreeScene(EmbreeDevice &device, const Mesh &mesh, RTCBuildQuality quality,
+                RTCSceneFlags flags = RTC_SCENE_FLAG_NONE);
     ~EmbreeScene();
     EmbreeScene(const EmbreeScene &) = delete;
     EmbreeScene &operator=(const EmbreeScene &) = delete;

@@ -4,6 +4,7 @@
 #include "bind/trace_options.h"
 #include "bind/watch.h"
 #include "embree_frame.h"
+#include "embree_hits.h"
 #include "mlrt_engine.h"
 #include "render/camera.h"
 
@@ -22,6 +23,8 @@ namespace {
 
 using Image = nb::ndarray<float, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 using Primitives = nb::ndarray<uint32_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
+using Distances = nb::ndarray<float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
+using Numbers = nb::ndarray<uint32_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Bytes = nb::ndarray<uint8_t, nb::shape<-1, -1>, nb::c_contig, nb::device::cpu>;
 
 const EnumNames<EmbreeMode> EMBREE_MODES{{"r16", EmbreeMode::packet},
@@ -200,13 +203,30 @@ void bind_embree(nb::module_ &m) {
     nb::class_<EmbreeScene>(m, "EmbreeScene")
         .def(
             "__init__",
-            [](EmbreeScene *self, EmbreeDevice &device, const Mesh &mesh, bool high) {
+            [](EmbreeScene *self, EmbreeDevice &device, const Mesh &mesh, bool high,
+               bool robust) {
                 nb::gil_scoped_release release;
                 new (self) EmbreeScene(
-                    device, mesh, high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+                    device, mesh, high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM,
+                    robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
             },
-            nb::arg("device"), nb::arg("mesh"), nb::arg("high"), nb::keep_alive<1, 2>(),
-            nb::keep_alive<1, 3>())
+            nb::arg("device"), nb::arg("mesh"), nb::arg("high"), nb::arg("robust") = false,
+            nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
+        .def(
+            "closest_hit",
+            [](const EmbreeScene &self, const Points &origins, const Points &directions,
+               const Distances &t, const Numbers &primitives) {
+                const size_t count = origins.shape(0);
+                if (directions.shape(0) != count || t.shape(0) != count ||
+                    primitives.shape(0) != count)
+                    refuse_value("origins, directions, t and primitives must have the same "
+                                 "length.");
+                nb::gil_scoped_release release;
+                closest_hits(self, origins.data(), directions.data(), count, t.data(),
+                             primitives.data());
+            },
+            nb::arg("origins"), nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
+            "Writes the nearest hits of rays.")
         .def_prop_ro("seconds", [](const EmbreeScene &self) { return self.seconds(); })
         .def_prop_ro("bytes", &EmbreeScene::bytes)
         .def_prop_ro("peak_bytes", &EmbreeScene::peak_bytes)

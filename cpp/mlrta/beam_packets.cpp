@@ -20,6 +20,10 @@ constexpr float GREATEST_SLOPE = 2;
 constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
 constexpr float SMALLEST_SLOPE = 0x1p-100f;
 
+// Where all rays go straight along the axis, there is nothing to round, but extents that
+// others divide by must not be zero.
+constexpr float LEAST_SLACK = 0x1p-120f;
+
 // Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those
 // of what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
@@ -189,8 +193,9 @@ void BeamPackets::fit_rectangle() {
     const float reach = std::max({-beam_p0, beam_p1, -beam_q0, beam_q1});
     const float slack = rectangle.slack =
         FLOAT_ROUNDOFF *
-        (64 * reach + 8 * (std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
-                           size_u + size_v));
+            (64 * reach + 8 * (std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
+                               size_u + size_v)) +
+        LEAST_SLACK;
     rectangle.half_p = 0.5f * (beam_p1 - beam_p0) + slack;
     rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
     greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +

@@ -17,9 +17,11 @@ from .options import (
     Parser,
     add_sample_counts,
     add_shared_options,
+    add_study_options,
     check_folder_of,
     check_json,
     check_threads,
+    names,
     settings_of_tracing,
     sizes,
 )
@@ -36,7 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = make_parser().parse_args(argv)
         run: Callable[[argparse.Namespace], bool] = options.run
         check_json(options.json)
-        check_threads(options.threads)
+        threads = options.threads
+        check_threads([threads] if isinstance(threads, int) else threads)
         return DONE if run(options) else DISAGREE
     except BenchError as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
@@ -114,6 +117,31 @@ def make_parser() -> Parser:
     tiles.set_defaults(run=run_tiles)
     add_shared_options(tiles, repeats=5)
     add_sample_counts(tiles)
+    watertight = commands.add_parser(
+        "watertight",
+        help="rays at vertices and edges of closed meshes, of which none may escape",
+        description="Traces rays from inside of closed meshes at their vertices and edges "
+        "with MLRT and with Embree in its default and its robust mode, and counts those "
+        "that find nothing. The exit code is 2 if MLRT loses one.",
+    )
+    watertight.set_defaults(run=run_watertight)
+    add_study_options(watertight, rays=10**9)
+    watertight.add_argument(
+        "--meshes",
+        type=names,
+        metavar="A,B",
+        help="sphere, slivers, bunny, dragon, one of them with ' at 10^6' added, or an "
+        "XML file (all usual ones)",
+    )
+    hits = commands.add_parser(
+        "hits",
+        help="adversarial rays against exact arithmetic",
+        description="Traces rays that rounding makes tracers fail on, in small scenes, "
+        "with MLRT and with Embree in its default and its robust mode, and counts the hits "
+        "that exact arithmetic does not confirm. The exit code is 2 if MLRT has one.",
+    )
+    hits.set_defaults(run=run_hits)
+    add_study_options(hits, rays=10**6)
     return parser
 
 
@@ -138,6 +166,18 @@ def run_rays(options: argparse.Namespace) -> bool:
 
 def run_tiles(options: argparse.Namespace) -> bool:
     from .tiles_command import run
+
+    return run(options)
+
+
+def run_watertight(options: argparse.Namespace) -> bool:
+    from .watertight_command import run
+
+    return run(options)
+
+
+def run_hits(options: argparse.Namespace) -> bool:
+    from .hits_command import run
 
     return run(options)
 

@@ -5,16 +5,25 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from mlrt_plugin.image_files import replacing
 
 from .errors import BenchError
-from .scenes import SceneSource
 
 FORMAT_VERSION = 1
 """Of the JSON file."""
 Loaded = TypeVar("Loaded")
+
+
+class Named(Protocol):
+    """A scene or a mesh that can be loaded."""
+
+    @property
+    def name(self) -> str: ...
+
+
+Source = TypeVar("Source", bound=Named)
 
 
 def new_figures(
@@ -31,8 +40,8 @@ def new_figures(
 
 def measure_scenes(
     figures: dict[str, Any],
-    sources: Sequence[SceneSource],
-    load: Callable[[SceneSource], Loaded],
+    sources: Sequence[Source],
+    load: Callable[[Source], Loaded],
     measure: Callable[[Loaded, dict[str, Any]], None],
     json_file: Path | None,
 ) -> list[dict[str, Any]]:

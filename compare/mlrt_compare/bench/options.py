@@ -66,6 +66,35 @@ def add_shared_options(
     )
 
 
+def add_study_options(command: argparse.ArgumentParser, *, rays: int) -> None:
+    """Those of studies of hits. ``rays``: the usual number of them."""
+    command.add_argument(
+        "--json", type=Path, metavar="FILE", help="write all figures there"
+    )
+    command.add_argument(
+        "--rays",
+        type=ray_count,
+        default=rays,
+        metavar="N",
+        help=f"in all, such as 1e6 ({rays:.0e})",
+    )
+    command.add_argument(
+        "--seed", type=count, default=1, metavar="N", help="of the random numbers (1)"
+    )
+    command.add_argument(
+        "--threads", type=count, default=os.cpu_count() or 1, metavar="N", help="(all)"
+    )
+    command.add_argument(
+        "--cache", type=Path, metavar="DIR", help="folder for the native side"
+    )
+    command.add_argument(
+        "--source",
+        type=Path,
+        metavar="DIR",
+        help="MLRT's source checkout (the current one)",
+    )
+
+
 def add_sample_counts(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--spp",
@@ -122,6 +151,16 @@ def count(text: str) -> int:
     if not 1 <= value <= limit:
         raise argparse.ArgumentTypeError(f"{value} is not from 1 to {limit}")
     return value
+
+
+def ray_count(text: str) -> int:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not (1 <= value <= 1e12 and value.is_integer()):
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number from 1 to 1e12")
+    return int(value)
 
 
 def counts(text: str) -> tuple[int, ...]:

@@ -1,0 +1,99 @@
+"""The command `mlrt-bench watertight`."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from mlrt_plugin.threads import thread_count
+
+from . import watertight
+from .checkout import find_checkout
+from .closed_meshes import ClosedMesh, chosen_meshes, usual_meshes
+from .figures import measure_scenes, new_figures, show, write_json
+from .hit_contenders import hit_contenders
+from .machine import machine_record
+from .native import Native, load_native
+from .options import default_cache
+from .status import show_status
+from .table import aligned
+from .watertight import AIMS, Leaks
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Returns whether no ray escaped MLRT."""
+    source = find_checkout(options.source)
+    meshes = chosen_meshes(options.meshes, usual_meshes(source))
+    native = load_native(source, options.cache or default_cache())
+    settings = {"rays": options.rays, "seed": options.seed, "threads": options.threads}
+    figures = new_figures("watertight", machine_record(source, native), settings)
+    share = max(1, options.rays // (len(meshes) * len(AIMS)))
+
+    def measure(mesh: ClosedMesh, scene: dict[str, Any]) -> None:
+        with thread_count(options.threads):
+            scene |= study(native, mesh, share, options.seed, options.threads)
+        show(["", *lines(scene)])
+
+    measured = measure_scenes(
+        figures, meshes, lambda mesh: mesh.load(), measure, options.json
+    )
+    figures["total"] = total(measured)
+    show(["", *total_lines(figures["total"])])
+    write_json(options.json, figures)
+    return bool(figures["total"]["leaks"]["MLRT"] == 0)
+
+
+def study(
+    native: Native, mesh: ClosedMesh, count: int, seed: int, threads: int
+) -> dict[str, Any]:
+    """Figures of a mesh: a row for each aim."""
+    show_status(f"{mesh.name}: preparing")
+    start = time.perf_counter()
+    points = watertight.points_of(mesh, seed)
+    contenders = hit_contenders(native, mesh.vertices, mesh.faces, threads)
+    rows = []
+    for number, aim in enumerate(AIMS):
+        show_status(f"{mesh.name}: {aim.name}")
+        leaks = watertight.trace(mesh, contenders, aim, count, seed + number, points)
+        rows.append({"aim": aim.name, "rays": count, "leaks": leaks_as_json(leaks)})
+    show_status("")
+    return {
+        "triangles": len(mesh.faces),
+        "rows": rows,
+        "seconds": time.perf_counter() - start,
+    }
+
+
+def leaks_as_json(leaks: dict[str, Leaks]) -> dict[str, Any]:
+    return {
+        name: {"count": found.count, "examples": found.examples}
+        for name, found in leaks.items()
+    }
+
+
+def lines(scene: dict[str, Any]) -> list[str]:
+    """Leaks of a mesh, as text."""
+    names = list(scene["rows"][0]["leaks"])
+    table = [("", "rays", *names)]
+    for row in scene["rows"]:
+        counts = (f"{row['leaks'][name]['count']:,}" for name in names)
+        table.append((row["aim"], f"{row['rays']:,}", *counts))
+    head = f"{scene['name']}, {scene['triangles']:,} triangles, leaks:"
+    return [head, *aligned(table)]
+
+
+def total(scenes: list[dict[str, Any]]) -> dict[str, Any]:
+    rows = [row for scene in scenes for row in scene["rows"]]
+    names = list(rows[0]["leaks"])
+    return {
+        "rays": sum(row["rays"] for row in rows),
+        "leaks": {name: sum(row["leaks"][name]["count"] for row in rows) for name in names},
+    }
+
+
+def total_lines(found: dict[str, Any]) -> list[str]:
+    return [
+        f"{name}: {count:,} of {found['rays']:,} rays escape, {count / found['rays']:.3g}"
+        for name, count in found["leaks"].items()
+    ]

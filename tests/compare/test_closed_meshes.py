@@ -1,0 +1,89 @@
+"""Closed meshes and what is inside of them, by hand and by independent means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import workloads
+from mlrt_compare.bench.closed_meshes import (
+    ClosedMesh,
+    boundary,
+    chosen_meshes,
+    closed,
+    inner_points,
+    slivers,
+    sphere,
+    usual_meshes,
+    winding_numbers,
+)
+from mlrt_compare.bench.errors import BenchError
+from repository import ROOT
+
+SEED = 3
+
+
+def test_boundaries() -> None:
+    square = np.array([(0, 1, 2), (0, 2, 3)], np.uint32)
+    assert sorted(map(tuple, boundary(square))) == [(0, 1), (1, 2), (2, 3), (3, 0)]
+    # The diagonal twice in the same direction: neither is met by its reverse.
+    turned = np.array([(0, 1, 2), (3, 2, 0)], np.uint32)
+    assert sorted(map(tuple, boundary(turned)))[-3:] == [(2, 0), (2, 0), (3, 2)]
+    assert len(boundary(workloads.sphere(2)[1])) == 0
+    assert len(boundary(np.array([(1, 1, 2), (5, 5, 5)], np.uint32))) == 0
+
+
+def test_holes_are_closed() -> None:
+    vertices, faces = workloads.box()
+    opened = np.delete(faces, [0, 5, 6], axis=0)
+    with pytest.raises(BenchError, match="the mesh box is not closed"):
+        ClosedMesh("box", vertices, opened).checked()
+    mesh = closed(
+        "box",
+        vertices[opened].reshape(-1, 3),
+        np.arange(27, dtype=np.uint32).reshape(-1, 3),
+    )
+    assert len(mesh.vertices) == 8 + 1
+    middle = np.zeros((1, 3), np.float32)
+    assert abs(winding_numbers(mesh, middle)[0]) == pytest.approx(1)
+
+
+def test_winding_numbers() -> None:
+    vertices, faces = workloads.box()
+    box = ClosedMesh("box", vertices, faces)
+    points = np.float32([(0, 0, 0), (0.9, -0.9, 0.99), (1.1, 0, 0), (5, 5, 5)])
+    found = winding_numbers(box, points)
+    np.testing.assert_allclose(np.abs(found), [1, 1, 0, 0], atol=1e-12)
+    twice = ClosedMesh("twice", vertices, np.concatenate([faces, faces]))
+    np.testing.assert_allclose(winding_numbers(twice, points), 2 * found, atol=1e-12)
+
+
+@pytest.mark.parametrize("make", [sphere, slivers])
+@pytest.mark.parametrize("far", [False, True])
+def test_made_meshes(make: object, far: bool) -> None:
+    mesh = (sphere(3) if make is sphere else slivers(5, 90)).checked()
+    mesh = mesh.moved_far() if far else mesh
+    rng = np.random.default_rng(SEED)
+    points = inner_points(mesh, rng, 20)
+    assert points.shape == (20, 3) and points.dtype == np.float32
+    centre = (1e6 if far else 0) * np.ones(3)
+    radius = np.linalg.norm(mesh.vertices.astype(np.float64) - centre, axis=1).max()
+    assert (np.linalg.norm(points.astype(np.float64) - centre, axis=1) < radius).all()
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    lengths = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    if far:
+        assert np.median(lengths) == pytest.approx(1, rel=0.1)
+    elif make is slivers:
+        assert (lengths.max(axis=1) / lengths.min(axis=1)).max() > 100
+
+
+def test_meshes_by_name() -> None:
+    usual = usual_meshes(ROOT)
+    assert [source.name for source in usual][:2] == ["sphere", "sphere at 10^6"]
+    assert len(usual) == 8
+    assert [s.name for s in chosen_meshes(["slivers"], usual)] == ["slivers"]
+    assert [s.name for s in chosen_meshes(["a/cup.xml"], usual)] == ["cup", "cup at 10^6"]
+    with pytest.raises(BenchError, match=r"no mesh 'cup': choose from sphere,"):
+        chosen_meshes(["cup"], usual)
+    (absent, _) = chosen_meshes(["a/cup.xml"], usual)
+    with pytest.raises(BenchError, match=r"there is no a/cup\.xml"):
+        absent.load()

@@ -1,0 +1,98 @@
+"""What may not matter at all: the floating-point environment, threads, how rays come."""
+
+from __future__ import annotations
+
+import ctypes
+import ctypes.util
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import workloads
+from hard_cases.case import SEED, covers
+from hard_cases.running import WAYS
+from kd_trees import BUILDERS
+from tracing import build, closest
+
+from mlrt_plugin._dispatch import core
+from mlrt_plugin.threads import thread_count
+
+
+@contextmanager
+def denormals_flushed() -> Iterator[None]:
+    """Sets FTZ and DAZ of this thread, bits 15 and 6 of the MXCSR, which glibc keeps at the
+    end of the 32 bytes of its fenv_t."""
+    libm = ctypes.CDLL(ctypes.util.find_library("m"))
+    before = (ctypes.c_uint32 * 8)()
+    assert libm.fegetenv(before) == 0
+    flushing = (ctypes.c_uint32 * 8)(*before[:7], before[7] | 0x8040)
+    assert libm.fesetenv(flushing) == 0
+    try:
+        yield
+    finally:
+        assert libm.fesetenv(before) == 0
+
+
+def small_scene() -> workloads.Scene:
+    """A sphere of radius 2^-100 beside one of radius 2^-130, whose coordinates are
+    denormal."""
+    vertices, faces = workloads.sphere(2)
+    tiny = vertices * np.float32(2.0**-130) + np.float32([0, 0, 2.0**-128])
+    return (
+        np.concatenate([vertices * np.float32(2.0**-100), tiny]).astype(np.float32),
+        np.concatenate([faces, faces + np.uint32(len(vertices))]),
+    )
+
+
+@covers(38)
+@pytest.mark.parametrize("builder", BUILDERS)
+def test_flushing_denormal_numbers_changes_nothing(builder: str) -> None:
+    """Dr.Jit's threads flush denormal numbers, Python's thread does not, and rays are
+    traced by both."""
+    rng = np.random.default_rng(SEED)
+    vertices, faces = small_scene()
+    origins = (rng.uniform(-0.3, 0.3, (400, 3)) * 2.0**-101).astype(np.float32)
+    origins[::2] = origins[0]
+    rays = origins, (rng.choice(vertices, 400) - origins) * np.float32(2.0**80)
+    plain = build(core, (vertices, faces), **BUILDERS[builder])
+    expected = closest(plain, rays, WAYS["brute force"])
+    assert (expected.face >= 0).all()
+    with thread_count(1):
+        for options in WAYS.values():
+            closest(plain, rays, options).assert_same(expected)
+            with denormals_flushed():
+                flushed = np.float32(2.0**-149) * np.ones(1, np.float32)
+                tree = build(core, (vertices, faces), **BUILDERS[builder])
+                found = closest(tree, rays, options)
+            assert flushed[0] == 0, "denormal numbers were not flushed"
+            found.assert_same(expected)
+
+
+@covers(38)
+@pytest.mark.parametrize("builder", BUILDERS)
+def test_threads_and_numbers_of_rays_change_nothing(builder: str) -> None:
+    """Which rays share a packet, a beam and a thread hangs on how many there are, and a
+    lazy tree grows in another order."""
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 300)
+    spread = workloads.all_rays(rng, scene, 150)
+    camera = workloads.camera(scene, 2, 41)
+    for rays in (spread, camera):
+        expected = closest(build(core, scene), rays, WAYS["brute force"])
+        for threads in (1, 2, 5):
+            with thread_count(threads):
+                for options in WAYS.values():
+                    tree = build(core, scene, **BUILDERS[builder])
+                    closest(tree, rays, options).assert_same(expected)
+                    for first, count in ((0, 1), (3, 8), (7, 16), (5, 777)):
+                        part = slice(first, first + count)
+                        found = closest(tree, (rays[0][part], rays[1][part]), options)
+                        np.testing.assert_array_equal(found.t, expected.t[part])
+                        np.testing.assert_array_equal(found.face, expected.face[part])
+
+
+@covers(38)
+@pytest.mark.skip(reason="there is one layout of nodes; variants of it do not exist")
+def test_layouts_of_nodes_change_nothing() -> None:
+    """Another layout visits the same cells at other addresses."""
