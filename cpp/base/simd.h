@@ -304,6 +304,10 @@ inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
     return {DoublePacket(v.x), DoublePacket(v.y), DoublePacket(v.z)};
 }
 
+// Real's counterpart in double precision.
+template <typename Real>
+using DoubleOf = decltype(to_double(Real()));
+
 // Keeps denormal numbers while it lives: Dr.Jit's threads flush them to zero.
 class KeepDenormals {
 private:

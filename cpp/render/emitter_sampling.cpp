@@ -65,7 +65,8 @@ Choices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
 template <typename Real>
 struct AreaPoint {
     Vec3<Real> p;
-    Vec3<Real> normal; // unit, on the glowing side
+    Vec3<Real> normal;      // unit, on the glowing side
+    Vec3<Real> face_normal; // unit
 };
 
 // Calls function(value) for the values of all lanes.
@@ -107,7 +108,7 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
     if (emitter.rectangle)
         return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
                     y * spread<Real>(emitter.edge_v),
-                spread<Real>(table.normal)};
+                spread<Real>(table.normal), spread<Real>(table.normal)};
 
     const Shape &shape = scene.data.shapes[emitter.shape];
     FacesOf<Real> faces;
@@ -128,6 +129,7 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
         point.normal = cross(e0, e1);
     }
     point.normal = normalize(point.normal);
+    point.face_normal = shape.vertex_normals ? normalize(cross(e0, e1)) : point.normal;
     if (shape.flip_normals)
         point.normal = -point.normal;
     return point;
@@ -184,12 +186,13 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     }
     case EmitterType::area: {
         if (!(table.inverse_area > 0))
-            return {spread<Real>({}), spread<Real>({}), spread<Real>({})};
+            return {spread<Real>({}), spread<Real>({}), spread<Real>({}), spread<Real>({})};
         const AreaPoint<Real> point = sample_area(scene, emitter, table, x, y);
         const Vec3<Real> to_light = point.p - p;
         const Real squared = dot(to_light, to_light);
         const Real distance = square_root(squared);
         sample.target = point.p;
+        sample.target_normal = point.face_normal;
         sample.direction = to_light * (one / distance);
         const Real cosine = dot(sample.direction, point.normal);
         const Real density = Real(table.inverse_area) * (squared / -cosine);
@@ -227,7 +230,8 @@ EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket
     // Lanes that chose the same emitter are served together.
     const UIntPacket emitters = choices.emitter;
     samples.emitter = to_lanes<uint32_t>(emitters);
-    samples.weight = samples.direction = samples.target = spread<FloatPacket>({});
+    samples.weight = samples.direction = samples.target = samples.target_normal =
+        spread<FloatPacket>({});
     while (lanes != 0) {
         const uint32_t emitter = samples.emitter[uint32_t(std::countr_zero(lanes))];
         const LaneBits served = to_bits(emitters == UIntPacket(emitter));
@@ -238,6 +242,8 @@ EmitterSamples sample_emitter(const PreparedScene &scene, const Vec3<FloatPacket
             samples.weight[k] = select(mask, part.weight[k], samples.weight[k]);
             samples.direction[k] = select(mask, part.direction[k], samples.direction[k]);
             samples.target[k] = select(mask, part.target[k], samples.target[k]);
+            samples.target_normal[k] =
+                select(mask, part.target_normal[k], samples.target_normal[k]);
         }
         lanes &= ~served;
     }

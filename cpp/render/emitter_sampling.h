@@ -14,6 +14,7 @@ struct EmitterSample {
     Vec3<Real> weight;    // unoccluded radiance over probability density; 0: no light here
     Vec3<Real> direction; // unit, towards the light; any value if there is none
     Vec3<Real> target;    // where the shadow ray ends; any value if there is none
+    Vec3<Real> target_normal; // unit, of the face that it lies on; 0 if on none
 };
 
 struct OneEmitterSample : EmitterSample<float> {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mlrt {
 
@@ -13,6 +14,47 @@ float face_area(const Triangle &triangle) {
     return 0.5f * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
+// See shadow_offset.h. The triangles of a rectangle lie off the parallelogram as far as
+// their vertices do.
+Vec3f point_error(const SceneData &scene, const Emitter &emitter) {
+    const Shape &shape = scene.shapes[emitter.shape];
+    Vec3d largest{}, deviation{};
+    const auto add = [&](const Vec3f &vertex) {
+        for (int k = 0; k < 3; ++k)
+            largest[k] = std::max(largest[k], std::abs(double(vertex[k])));
+        if (!emitter.rectangle)
+            return;
+        const Vec3d corner(emitter.corner), u(emitter.edge_u), v(emitter.edge_v);
+        Vec3d nearest(vertex);
+        double distance = std::numeric_limits<double>::infinity();
+        for (const Vec3d &ideal : {corner, corner + u, corner + v, corner + u + v}) {
+            const Vec3d difference = abs(Vec3d(vertex) - ideal);
+            if (dot(difference, difference) < distance) {
+                distance = dot(difference, difference);
+                nearest = difference;
+            }
+        }
+        for (int k = 0; k < 3; ++k)
+            deviation[k] = std::max(deviation[k], nearest[k]);
+    };
+    for (uint32_t i = 0; i < shape.face_count; ++i) {
+        const Triangle &triangle = scene.tree->triangles[shape.first_face + i];
+        add(triangle.a);
+        add(triangle.b);
+        add(triangle.c);
+    }
+    return Vec3f(largest * EMITTER_POINT_ERROR + deviation * (1 + EMITTER_POINT_ERROR));
+}
+
+// Rays from a light end at surfaces, off by half a unit in the last place of their length:
+// from a light that is much farther away than the scene is large they would end too far
+// off, and begin at the surface instead.
+bool is_near(const Box3f &bounds, Vec3f light) {
+    constexpr float FAR = 16; // chosen: the offset of a hit grows up to that much
+    return max_component(abs(light)) <=
+           FAR * std::max(max_component(abs(bounds.lo)), max_component(abs(bounds.hi)));
+}
+
 EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
     EmitterTable table;
     if (emitter.type == EmitterType::spot) {
@@ -20,9 +62,13 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
         table.cos_beam = float(std::cos(double(emitter.beam_width)));
         table.inverse_transition = 1.0f / (emitter.cutoff_angle - emitter.beam_width);
     }
+    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
+        table.shadow_rays_from_light =
+            !scene.tree->bounds.empty() && is_near(scene.tree->bounds, emitter.position);
     if (emitter.type != EmitterType::area)
         return table;
 
+    table.point_error = point_error(scene, emitter);
     const Shape &shape = scene.shapes[emitter.shape];
     if (emitter.rectangle) {
         const Vec3f normal = cross(emitter.edge_u, emitter.edge_v);

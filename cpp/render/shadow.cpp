@@ -1,8 +1,7 @@
 #include "render/shadow.h"
 
-#include "render/shadow_offset.h"
-
 #include <bit>
+#include <limits>
 #include <numeric>
 
 namespace mlrt {
@@ -57,11 +56,15 @@ void ShadowTracer::add_costs_to(const ShadowCandidates &candidates,
 }
 
 void ShadowTracer::trace_group(const ShadowCandidates &candidates,
-                               std::span<const uint32_t> group, const Emitter &emitter,
+                               std::span<const uint32_t> group, uint32_t number,
                                float *costs) {
     const size_t count = group.size();
-    const bool from_light =
+    const Emitter &emitter = scene_.data.emitters[number];
+    const bool is_point =
         emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+    const bool from_light = offset_ == ShadowOffset::robust
+                                ? scene_.emitter_tables[number].shadow_rays_from_light
+                                : is_point;
     const float sign = from_light ? -1.0f : 1.0f;
     for (int k = 0; k < 3; ++k) {
         direction_[k].resize(count);
@@ -73,8 +76,19 @@ void ShadowTracer::trace_group(const ShadowCandidates &candidates,
         for (size_t i = 0; i < count; ++i)
             origin_[k][i] = candidates.origin[k][group[i]];
     }
-    t_min_.assign(count, from_light ? SHADOW_EPSILON : 0.0f);
-    t_max_.assign(count, from_light ? 1.0f : 1.0f - SHADOW_EPSILON);
+    if (offset_ == ShadowOffset::mitsuba) {
+        t_min_.assign(count, from_light ? SHADOW_EPSILON : 0.0f);
+        t_max_.assign(count, from_light ? 1.0f : 1.0f - SHADOW_EPSILON);
+    } else {
+        t_min_.assign(count, 0.0f);
+        t_max_.assign(count, BEFORE_TARGET);
+        // All rays are parallel, wherever they start, and nothing is behind the light.
+        if (emitter.type == EmitterType::directional) {
+            for (int k = 0; k < 3; ++k)
+                direction_[k].assign(count, -emitter.direction[k]);
+            t_max_.assign(count, std::numeric_limits<float>::max());
+        }
+    }
     occluded_.resize(count);
 
     RayGroup rays;

@@ -5,6 +5,7 @@
 #include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/prepared_scene.h"
+#include "render/shadow_offset.h"
 
 #include <cstdint>
 #include <span>
@@ -36,12 +37,13 @@ struct ShadowCandidates {
 //
 // The rays of one emitter are traced as one group. For point and spot lights they start at
 // the light, so that they share an origin and form a beam; the interval leaves out the same
-// share at the light's end as in Mitsuba, where they run the other way.
+// share at the light's end as in Mitsuba, where they run the other way. With robust offsets
+// it leaves out nothing, and lights that are far away are traced from the surfaces.
 class ShadowTracer {
 public:
     ShadowTracer(const PreparedScene &scene, const TraceOptions &options,
-                 Counters &counters)
-        : scene_(scene), options_(options), counters_(counters) {}
+                 ShadowOffset offset, Counters &counters)
+        : scene_(scene), options_(options), offset_(offset), counters_(counters) {}
 
     template <typename Visible>
     void trace(const ShadowCandidates &candidates, Visible &&visible) {
@@ -54,7 +56,7 @@ public:
             while (end < candidates.count && candidates.emitter[order_[end]] == emitter)
                 ++end;
             const std::span<const uint32_t> group(order_.data() + begin, end - begin);
-            trace_group(candidates, group, scene_.data.emitters[emitter],
+            trace_group(candidates, group, emitter,
                         keep_costs_ ? costs_.data() + begin : nullptr);
             for (size_t i = 0; i < group.size(); ++i)
                 if (!occluded_[i])
@@ -71,10 +73,11 @@ public:
 private:
     void sort_by_emitter(const ShadowCandidates &candidates);
     void trace_group(const ShadowCandidates &candidates, std::span<const uint32_t> group,
-                     const Emitter &emitter, float *costs);
+                     uint32_t number, float *costs);
 
     const PreparedScene &scene_;
     const TraceOptions &options_;
+    ShadowOffset offset_;
     Counters &counters_;
     std::vector<uint32_t> order_; // of the candidates, by emitter
     std::vector<uint32_t> next_;  // of each emitter: the next free place in order_

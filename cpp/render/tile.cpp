@@ -2,6 +2,7 @@
 
 #include "render/emitter_sampling.h"
 #include "render/shadow_offset.h"
+#include "render/shadow_segment.h"
 
 #include <algorithm>
 #include <cmath>
@@ -208,10 +209,15 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
     lanes &= not_black(light.weight) & to_bits(cos_light > zero);
     if (lanes == 0)
         return;
-    const Vec3<FloatPacket> start =
-        offset_point(point.p, point.face_normal, light.target - point.p);
+    const ShadowSegment<FloatPacket> segment =
+        offset_ == ShadowOffset::robust
+            ? robust_segment<FloatPacket>(scene_, {hit.origin, hit.direction, hit.faces},
+                                          light)
+            : ShadowSegment<FloatPacket>{
+                  offset_point(point.p, point.face_normal, light.target - point.p),
+                  light.target};
     const FloatPacket share = FloatPacket(std::numbers::inv_pi_v<float>) * cos_light;
-    candidates_.append(lanes, hit.ray, light.emitter, start, light.target,
+    candidates_.append(lanes, hit.ray, light.emitter, segment.start, segment.target,
                        (albedo * share) * light.weight);
 }
 
@@ -236,7 +242,10 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     });
     if (hidden != 0) {
         const Vec3<FloatPacket> start =
-            offset_point(point.p, point.face_normal, hit.direction);
+            offset_ == ShadowOffset::robust
+                ? robust_passage<FloatPacket>(scene_,
+                                              {hit.origin, hit.direction, hit.faces})
+                : offset_point(point.p, point.face_normal, hit.direction);
         for_each_lane(hidden, [&](uint32_t lane) {
             passing_.ray.push_back(hit.ray[lane]);
             for (int k = 0; k < 3; ++k)

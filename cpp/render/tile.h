@@ -9,6 +9,7 @@
 #include "render/prepared_scene.h"
 #include "render/sampler.h"
 #include "render/shadow.h"
+#include "render/shadow_offset.h"
 #include "render/surface.h"
 
 #include <cstdint>
@@ -66,9 +67,9 @@ struct PixelGroup {
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const TraceOptions &options, TileTarget target)
-        : scene_(scene), streams_(streams), options_(options), target_(target),
-          shadow_tracer_(scene, options_, counters_.shadow) {}
+                 const TraceOptions &options, ShadowOffset offset, TileTarget target)
+        : scene_(scene), streams_(streams), options_(options), offset_(offset),
+          target_(target), shadow_tracer_(scene, options_, offset, counters_.shadow) {}
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
 
@@ -124,6 +125,7 @@ private:
     const PreparedScene &scene_;
     const SampleStreams &streams_;
     TraceOptions options_;
+    ShadowOffset offset_;
     TileTarget target_;
     RenderCounters counters_;
     ShadowTracer shadow_tracer_;
