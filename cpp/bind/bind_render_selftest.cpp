@@ -179,6 +179,7 @@ nb::dict robust_segment_of(const SceneHandle &handle, const Floats3 &origin,
     result["start"] = array(start);
     result["target"] = array(target);
     result["light"] = array(light.target);
+    result["face"] = light.target_face == NONE ? -1 : int64_t(light.target_face);
     result["from_light"] = scene.emitter_tables[light.emitter].shadow_rays_from_light;
     return result;
 }
@@ -209,7 +210,7 @@ void bind_render_selftest(nb::module_ &m) {
     s.def("robust_segment", &robust_segment_of, nb::arg("scene"), nb::arg("origin"),
           nb::arg("direction"), nb::arg("primitive"), nb::arg("x"), nb::arg("y"),
           "The ends of the shadow ray from a hit to the sample that x and y give; light is "
-          "the sample itself.");
+          "the sample itself, face where it lies on.");
     s.attr("SHADOW_EPSILON") = SHADOW_EPSILON;
 }
 

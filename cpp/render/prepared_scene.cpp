@@ -14,36 +14,19 @@ float face_area(const Triangle &triangle) {
     return 0.5f * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
-// See shadow_offset.h. The triangles of a rectangle lie off the parallelogram as far as
-// their vertices do.
-Vec3f point_error(const SceneData &scene, const Emitter &emitter) {
-    const Shape &shape = scene.shapes[emitter.shape];
-    Vec3d largest{}, deviation{};
-    const auto add = [&](const Vec3f &vertex) {
-        for (int k = 0; k < 3; ++k)
-            largest[k] = std::max(largest[k], std::abs(double(vertex[k])));
-        if (!emitter.rectangle)
-            return;
-        const Vec3d corner(emitter.corner), u(emitter.edge_u), v(emitter.edge_v);
-        Vec3d nearest(vertex);
-        double distance = std::numeric_limits<double>::infinity();
-        for (const Vec3d &ideal : {corner, corner + u, corner + v, corner + u + v}) {
-            const Vec3d difference = abs(Vec3d(vertex) - ideal);
-            if (dot(difference, difference) < distance) {
-                distance = dot(difference, difference);
-                nearest = difference;
-            }
-        }
-        for (int k = 0; k < 3; ++k)
-            deviation[k] = std::max(deviation[k], nearest[k]);
+// How far, at most, faces of a rectangle lie off the plane of the first of them.
+float unevenness(const SceneData &scene, const Shape &shape) {
+    const auto triangle = [&](uint32_t i) -> const Triangle & {
+        return scene.tree->triangles[shape.first_face + i];
     };
-    for (uint32_t i = 0; i < shape.face_count; ++i) {
-        const Triangle &triangle = scene.tree->triangles[shape.first_face + i];
-        add(triangle.a);
-        add(triangle.b);
-        add(triangle.c);
-    }
-    return Vec3f(largest * EMITTER_POINT_ERROR + deviation * (1 + EMITTER_POINT_ERROR));
+    const Vec3d a(triangle(0).a);
+    const Vec3d normal =
+        normalize(cross(Vec3d(triangle(0).b) - a, Vec3d(triangle(0).c) - a));
+    double largest = 0;
+    for (uint32_t i = 1; i < shape.face_count; ++i)
+        for (const Vec3f &vertex : {triangle(i).a, triangle(i).b, triangle(i).c})
+            largest = std::max(largest, std::abs(dot(normal, Vec3d(vertex) - a)));
+    return std::nextafter(float(largest), std::numeric_limits<float>::infinity());
 }
 
 // Rays from a light end at surfaces, off by half a unit in the last place of their length:
@@ -68,10 +51,10 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
     if (emitter.type != EmitterType::area)
         return table;
 
-    table.point_error = point_error(scene, emitter);
     const Shape &shape = scene.shapes[emitter.shape];
     if (emitter.rectangle) {
         const Vec3f normal = cross(emitter.edge_u, emitter.edge_v);
+        table.unevenness = unevenness(scene, shape);
         const float area = length(normal);
         table.inverse_area = area > 0 ? 1.0f / area : 0.0f;
         // A mirrored rectangle glows on the side of its vertex normals, which is not that

@@ -19,7 +19,7 @@ struct EmitterTable {
     float cos_cutoff = 0;         // spot
     float cos_beam = 0;           // spot
     float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
-    Vec3f point_error{}; // area: how far rounding takes sampled points off the faces
+    float unevenness = 0; // rectangle: how far it lies off the plane of its first face
     bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
 

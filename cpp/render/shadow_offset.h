@@ -26,15 +26,15 @@
 // What is left are the errors e_k.
 //
 // A hit is interpolated anew in double precision, P = a + v (b - a) + w (c - a). Any v and
-// w give a point of the plane; eleven roundings of values up to 2 M_k, with M_k =
+// w of [0, 1] give a point of the plane; eleven roundings of values up to 2 M_k, with M_k =
 // max(|a_k|, |b_k|, |c_k|), leave e_k <= 2^-49 M_k. In single precision it would be 5 u
 // M_k, which is much where the triangle is large.
 //
-// A point on an emitter has been interpolated in single precision, as Mitsuba does it: on a
-// mesh as b0 fl(b - a) + (b1 fl(c - a) + a), in two fused operations, with e_k <= (2 + 2) u
-// M_k; on a rectangle, where products are rounded too, with e_k <= 6 u M_k. The triangles
-// of a rectangle may also lie off the parallelogram by which it is sampled; how far is
-// measured.
+// A point on an emitter has been interpolated in single precision, but is put back into the
+// plane of its face in double precision, P = Q - N (N.(Q - a)): nine roundings of values up
+// to 3 M_k, for which 2^-49 M_k is enough too. That takes it along the plane by no more
+// than it was wrong. A rectangle, whose vertices are rounded, need not be flat; how far it
+// lies off the plane of its first face is measured.
 //
 // The far end of a ray is not quite where it should be: its direction d = fl(S' - S) is off
 // by u |d_k|, which adds to the e_k of that end.
@@ -70,10 +70,8 @@ Vec3<Real> offset_point(const Vec3<Real> &p, const Vec3<Real> &normal,
 
 // u of the derivation above.
 inline constexpr double ROUNDING = 0x1p-24;
-// e_k / M_k of a hit in double precision, and of a point on an emitter, the rounding of the
-// point itself included.
-inline constexpr double HIT_ERROR = 0x1p-49;
-inline constexpr double EMITTER_POINT_ERROR = 8 * ROUNDING;
+// e_k / M_k of points in double precision.
+inline constexpr double PLANE_ERROR = 0x1p-49;
 // The end of a robust shadow ray. It is also short of a light without surface, which the
 // ray's direction may overshoot by u: (1 - 2u) (1 + u) < 1.
 inline constexpr float BEFORE_TARGET = 1 - 0x1p-23f;
