@@ -23,7 +23,7 @@ UNITS = 4
 ROUNDING = 2.0**-24
 GRAZING = 1e-6
 """Cosines below that may have either sign in single precision."""
-CHUNK = 256
+CHUNK = 1024
 
 
 @dataclass(frozen=True)
@@ -119,25 +119,30 @@ def triangles_of(arrays: Any) -> Doubles:
 def blocked(
     triangles: Doubles, start: Doubles, target: Doubles, left_out: npt.NDArray[np.int64]
 ) -> Bools:
-    """Whether anything but one face each lies between both ends (Möller and Trumbore
-    1997)."""
-    a = triangles[:, 0]
-    ab, ac = triangles[:, 1] - a, triangles[:, 2] - a
+    """Whether anything but one face each lies between both ends.
+
+    A line passes a triangle where it passes all three edges on the same side, which the
+    products of Plücker coordinates tell (Shoemake 1998, "Plücker coordinate tutorial").
+    """
+    center = triangles.mean(axis=(0, 1))
+    corners = triangles - center
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normal = np.cross(b - a, c - a)
+    offset = (a * normal).sum(axis=1)
+    edges = [(np.cross(p, q), q - p) for p, q in ((a, b), (b, c), (c, a))]
     result = np.zeros(len(start), bool)
     numbers = np.arange(len(triangles))
     for first in range(0, len(start), CHUNK):
         part = slice(first, first + CHUNK)
-        d = (target[part] - start[part])[:, None]
+        s, d = start[part] - center, target[part] - start[part]
+        moment = np.cross(s, d)
         with np.errstate(divide="ignore", invalid="ignore"):
-            p = np.cross(d, ac[None])
-            determinant = (p * ab).sum(axis=2)
-            s = start[part][:, None] - a[None]
-            u = (s * p).sum(axis=2) / determinant
-            q = np.cross(s, ab[None])
-            v = (q * d).sum(axis=2) / determinant
-            t = (q * ac).sum(axis=2) / determinant
-            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > BEGIN) & (t < 1 - BEGIN)
-        hit &= numbers[None] != left_out[part][:, None]
+            t = (offset - s @ normal.T) / (d @ normal.T)
+        hit = (t > BEGIN) & (t < 1 - BEGIN) & (numbers != left_out[part][:, None])
+        sides = [d @ m.T + moment @ e.T for m, e in edges]
+        hit &= ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | (
+            (sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0)
+        )
         result[part] = hit.any(axis=1)
     return result
 
