@@ -20,7 +20,7 @@ from . import __version__
 from .errors import one_sentence
 from .image_files import check_output, write_image
 from .info import scene_report
-from .options import AOVS
+from .options import AOVS, SHADOW_OFFSETS
 from .progress import ProgressBar
 from .render import checked_seed, checked_spp, prepare
 from .threads import thread_count
@@ -105,6 +105,12 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="NAMES",
         help=f"further channels, separated by commas: {', '.join(AOVS)}",
     )
+    render.add_argument(
+        "--shadow-offset",
+        choices=SHADOW_OFFSETS,
+        help="how shadow rays are kept off surfaces: by Mitsuba's formula, or by a bound "
+        "of the error, for scenes of any size (default: the scene's, else mitsuba)",
+    )
     add_tree_cache(render)
     add_build_options(render, ["builder"])
     tree = commands.add_parser(
@@ -140,6 +146,7 @@ def run_render(arguments: argparse.Namespace) -> None:
                 spp=arguments.spp,
                 seed=arguments.seed,
                 aovs=arguments.aov,
+                shadow_offset=arguments.shadow_offset,
                 progress=progress,
             )
     write_image(output, result.image, result.aovs)

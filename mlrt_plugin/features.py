@@ -27,6 +27,7 @@ OWN_PARAMETERS = (
     "hide_emitters",
     "emitter_samples",
     "bsdf_samples",
+    "shadow_offset",
     *INTEGRATOR_OPTIONS,
 )
 """Parameters of the integrator `mlrt`."""

@@ -1,9 +1,9 @@
 """The plugin ``<integrator type="mlrt">``.
 
 It is known to Mitsuba as soon as this package is imported, in the variant that is set and
-in all that are set later. Its parameters are `hide_emitters`, and the options of building
-and tracing in `mlrt_plugin.options.INTEGRATOR_OPTIONS`; they change the time that is taken,
-never the image.
+in all that are set later. Its parameters are `hide_emitters`, `shadow_offset`, and the
+options of building and tracing in `mlrt_plugin.options.INTEGRATOR_OPTIONS`; the latter
+change the time that is taken, never the image.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ def integrator_class(module: Any) -> type:
                         f"integrator '{PLUGIN}' supports {name} = {supported} only"
                     )
             self.mlrt_parameters = {
-                name: props.get(name) for name in INTEGRATOR_OPTIONS if name in props
+                name: props.get(name)
+                for name in ("shadow_offset", *INTEGRATOR_OPTIONS)
+                if name in props
             }
             self.prepared: PreparedScene | None = None
 

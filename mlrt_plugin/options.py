@@ -44,6 +44,9 @@ INTEGRATOR_OPTIONS = (
 """Those that the integrator `mlrt` takes as parameters: by ``max_depth`` Mitsuba's
 integrators mean the length of paths."""
 
+SHADOW_OFFSETS = ("mitsuba", "robust")
+"""Values of the option ``shadow_offset``: ``cpp/render/shadow_offset.h``."""
+
 AOVS = ("depth", "normal", "prim", "cost")
 """Images that can be had beside the colours."""
 

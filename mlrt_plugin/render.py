@@ -15,7 +15,14 @@ import numpy.typing as npt
 from ._dispatch import core
 from .emitters import check_distances
 from .errors import MlrtError, MlrtWarning
-from .options import AOVS, BUILD_OPTIONS, TRACE_OPTIONS, integer, split_options
+from .options import (
+    AOVS,
+    BUILD_OPTIONS,
+    SHADOW_OFFSETS,
+    TRACE_OPTIONS,
+    integer,
+    split_options,
+)
 from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
 from .threads import thread_count
@@ -91,16 +98,25 @@ class PreparedScene:
         spp: int | None = None,
         seed: int = 0,
         aovs: Sequence[str] = (),
+        shadow_offset: str | None = None,
         progress: Progress | None = None,
         **options: Any,
     ) -> RenderResult:
-        """Renders the scene; `options` are fields of `TraceOptions`. See `render`."""
+        """Renders the scene; `options` are fields of `TraceOptions`. See `render`.
+
+        shadow_offset: None takes what the scene gives its integrator `mlrt`.
+        """
         build, trace = split_options(options)
         if build:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
         samples = checked_spp(self.arrays.spp if spp is None else spp)
-        trace = {**self.arrays.lighting.own_options(TRACE_OPTIONS), **trace}
+        lighting = self.arrays.lighting
+        trace = {**lighting.own_options(TRACE_OPTIONS), **trace}
+        if shadow_offset is None:
+            own = lighting.own_options(("shadow_offset",))
+            shadow_offset = own.get("shadow_offset", SHADOW_OFFSETS[0])
+        check_shadow_offset(shadow_offset)
         start = time.perf_counter()
         result = core.render(
             self.handle,
@@ -109,6 +125,7 @@ class PreparedScene:
             trace,
             list(aovs),
             progress,
+            shadow_offset,
         )
         if progress is not None:
             progress(1.0)
@@ -188,6 +205,7 @@ def render(
     sensor: Any = 0,
     threads: int | None = None,
     aovs: Sequence[str] = (),
+    shadow_offset: str | None = None,
     defines: Mapping[str, object] | None = None,
     **params: Any,
 ) -> RenderResult:
@@ -199,6 +217,9 @@ def render(
     sensor: number of the sensor, in the order of declaration; of a loaded scene also a
     sensor. threads: None takes all of Dr.Jit's pool.
     aovs: further images, of depth, normal and prim.
+    shadow_offset: how shadow rays are kept off surfaces: "mitsuba", by Mitsuba's formula;
+    "robust", by a bound of the error, for scenes of any size. None takes what the scene
+    gives its integrator `mlrt`, else "mitsuba".
     defines: values of the file's $parameters.
     params: resolution, a pair (width, height); hide_emitters; tree_cache, a folder that
     trees are kept in from one process to the next; progress, called with the share of the
@@ -218,13 +239,22 @@ def render(
     progress = params.pop("progress", None)
     build, trace = split_options(params)
     check_aovs(aovs)
+    if shadow_offset is not None:
+        check_shadow_offset(shadow_offset)
     if spp is not None:
         checked_spp(spp)
     checked_seed(seed, 0)
     with thread_count(threads):
         prepared = prepare(scene, sensor=sensor, defines=defines, **of_scene, **build)
         prepared.warn(stacklevel=2)
-        return prepared.render(spp=spp, seed=seed, aovs=aovs, progress=progress, **trace)
+        return prepared.render(
+            spp=spp,
+            seed=seed,
+            aovs=aovs,
+            shadow_offset=shadow_offset,
+            progress=progress,
+            **trace,
+        )
 
 
 def checked_spp(spp: int) -> int:
@@ -244,6 +274,13 @@ def checked_seed(seed: int, base_seed: int) -> int:
     if not 0 <= seed <= 0xFFFFFFFF:
         raise MlrtError(f"seed = {seed} is out of range: it must be from 0 to 2**32 - 1")
     return (seed + base_seed) & 0xFFFFFFFF
+
+
+def check_shadow_offset(name: object) -> None:
+    """Raises MlrtError for what is not in SHADOW_OFFSETS."""
+    if name not in SHADOW_OFFSETS:
+        known = ", ".join(SHADOW_OFFSETS)
+        raise MlrtError(f"shadow_offset '{name}' does not exist: choose from {known}")
 
 
 def check_aovs(aovs: Sequence[str]) -> None:

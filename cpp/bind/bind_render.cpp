@@ -24,6 +24,7 @@ constexpr const char *RENDER_DOCSTRING =
 
 options: fields of TraceOptions (mlrta/trace.h), names of enumerators as str; they never
 change the picture.
+shadow_offset: where shadow rays begin and end, 'mitsuba' or 'robust' (render/shadow_offset.h).
 aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
 'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
 'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss); 'cost' (float32
@@ -54,9 +55,17 @@ AovSet aovs_from(const std::vector<std::string> &names) {
     return aovs;
 }
 
+ShadowOffset shadow_offset_from(const std::string &name) {
+    if (name == "mitsuba")
+        return ShadowOffset::mitsuba;
+    if (name == "robust")
+        return ShadowOffset::robust;
+    refuse_value("shadow_offset must be 'mitsuba' or 'robust', not '" + name + "'.");
+}
+
 nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
                       const nb::dict &options, const std::vector<std::string> &aovs,
-                      nb::object progress) {
+                      nb::object progress, const std::string &shadow_offset) {
     if (spp == 0)
         refuse_value("spp must be at least 1.");
     if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
@@ -66,6 +75,7 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     settings.seed = seed;
     settings.trace = trace_options_from(options);
     settings.aovs = aovs_from(aovs);
+    settings.shadow_offset = shadow_offset_from(shadow_offset);
 
     // Keeps the scene alive: another thread may drop the handle meanwhile.
     const std::shared_ptr<const PreparedScene> scene = handle.scene;
@@ -106,7 +116,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
 void bind_render(nb::module_ &m) {
     m.def("render", &render_scene, nb::arg("scene"), nb::arg("spp"), nb::arg("seed") = 0,
           nb::arg("options") = nb::dict(), nb::arg("aovs") = std::vector<std::string>(),
-          nb::arg("progress") = nb::none(), RENDER_DOCSTRING);
+          nb::arg("progress") = nb::none(), nb::arg("shadow_offset") = "mitsuba",
+          RENDER_DOCSTRING);
 }
 
 } // namespace mlrt

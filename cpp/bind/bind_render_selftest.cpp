@@ -1,11 +1,13 @@
 // The renderer's parts one by one, for tests that compare each with Mitsuba's.
 #include "bind/bind.h"
+#include "bind/fields.h"
 #include "bind/scene_handle.h"
 #include "render/camera.h"
 #include "render/emitter_sampling.h"
 #include "render/film_blocks.h"
 #include "render/sampler.h"
 #include "render/shadow_offset.h"
+#include "render/shadow_segment.h"
 #include "render/surface.h"
 
 #include <array>
@@ -176,6 +178,25 @@ Floats3 offset_point_of(const Floats3 &p, const Floats3 &normal, const Floats3 &
     return array(offset_point(vector(p), vector(normal), vector(towards)));
 }
 
+nb::dict robust_segment_of(const SceneHandle &handle, const Floats3 &origin,
+                           const Floats3 &direction, uint32_t primitive, float x, float y) {
+    const PreparedScene &scene = *handle.scene;
+    const Vec3f o = vector(origin), d = vector(direction);
+    const Vec3f p = hit_surface(scene, o, d, primitive).p;
+    const OneEmitterSample light = sample_emitter(scene, p, x, y);
+    if (light.emitter == NONE)
+        refuse_value("The scene must have an emitter.");
+    const auto [start, target] =
+        robust_segment<float>(scene, {o, d, primitive}, light.emitter, light);
+    nb::dict result;
+    result["start"] = array(start);
+    result["target"] = array(target);
+    result["light"] = array(light.target);
+    result["face"] = light.target_face == NONE ? -1 : int64_t(light.target_face);
+    result["from_light"] = scene.emitter_tables[light.emitter].shadow_rays_from_light;
+    return result;
+}
+
 } // namespace
 
 void bind_render_selftest(nb::module_ &m) {
@@ -199,6 +220,10 @@ void bind_render_selftest(nb::module_ &m) {
           "sample_emitter of sixteen points; numbers are x, y, unused.");
     s.def("offset_point", &offset_point_of, nb::arg("p"), nb::arg("normal"),
           nb::arg("towards"));
+    s.def("robust_segment", &robust_segment_of, nb::arg("scene"), nb::arg("origin"),
+          nb::arg("direction"), nb::arg("primitive"), nb::arg("x"), nb::arg("y"),
+          "The ends of the shadow ray from a hit to the sample that x and y give; light is "
+          "the sample itself, face where it lies on.");
     s.attr("SHADOW_EPSILON") = SHADOW_EPSILON;
 }
 

@@ -30,7 +30,8 @@ std::vector<Element> rows(const Array<T> &array, const char *name) {
         refuse_value(std::string(name) + " must have shape (N, 3).");
     std::vector<Element> result(array.shape(0));
     if (!result.empty())
-        std::memcpy(result.data(), array.data(), result.size() * sizeof(Element));
+        std::memcpy(static_cast<void *>(result.data()), array.data(),
+                    result.size() * sizeof(Element));
     return result;
 }
 

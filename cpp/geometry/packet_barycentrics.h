@@ -16,11 +16,13 @@ struct Corners {
     Vec3<Real> a, b, c;
 };
 
-// Weights of the vertices b and c. What sixteen rays share is given once: Origin and Corner
-// are float then, else Real. The results are the same.
+// Weights of the vertices b and c in double precision; zeros where they have none. What
+// sixteen rays share is given once: Origin and Corner are float then, else Real. The
+// results are the same.
 template <typename Real, typename Origin, typename Corner>
-Vec2<Real> barycentrics_of(const Vec3<Origin> &origin, const Vec3<Real> &direction,
-                           const Corners<Corner> &corners) {
+Vec2<DoubleOf<Real>> double_barycentrics_of(const Vec3<Origin> &origin,
+                                            const Vec3<Real> &direction,
+                                            const Corners<Corner> &corners) {
     using Shared =
         std::conditional_t<std::is_same_v<Origin, float>, DoubleOf<Corner>, DoubleOf<Real>>;
     using Double = DoubleOf<Real>;
@@ -34,9 +36,16 @@ Vec2<Real> barycentrics_of(const Vec3<Origin> &origin, const Vec3<Real> &directi
     const Double v = absolute(dot(d, Vec3<Double>(cross(c, a))));
     const Double w = absolute(dot(d, Vec3<Double>(cross(a, b))));
     const Double sum = u + v + w;
-    const MaskOf<Real> has_area(sum > Double(0.0));
-    const Real weight_b = select(has_area, Real(v / sum), Real(0.0f));
-    const Real weight_c = select(has_area, Real(w / sum), Real(0.0f));
+    const MaskOf<Double> has_area = sum > Double(0.0);
+    return {select(has_area, v / sum, Double(0.0)), select(has_area, w / sum, Double(0.0))};
+}
+
+// The same, rounded, and with a sum of at most one.
+template <typename Real, typename Origin, typename Corner>
+Vec2<Real> barycentrics_of(const Vec3<Origin> &origin, const Vec3<Real> &direction,
+                           const Corners<Corner> &corners) {
+    const auto weights = double_barycentrics_of(origin, direction, corners);
+    const Real weight_b(weights.x), weight_c(weights.y);
     return {weight_b, minimum(weight_c, Real(1.0f) - weight_b)};
 }
 

@@ -1,7 +1,5 @@
 #include "render/emitter_sampling.h"
 
-#include "render/surface.h"
-
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
@@ -34,6 +32,7 @@ template <typename Real>
 struct AreaPoint {
     Vec3<Real> p;
     Vec3<Real> normal; // unit, on the glowing side
+    FacesOf<Real> face;
 };
 
 // The face that y chooses, and y made uniform again.
@@ -55,24 +54,36 @@ Vec3<Real> spread(Vec3f v) {
     return {Real(v.x), Real(v.y), Real(v.z)};
 }
 
+// The same face in all lanes.
+template <typename Real>
+FacesOf<Real> all_of(uint32_t face) {
+    if constexpr (std::is_same_v<Real, float>) {
+        return face;
+    } else {
+        FaceNumbers faces;
+        faces.fill(face);
+        return faces;
+    }
+}
+
 // Mitsuba's rectangle.cpp and mesh.cpp, sample_position.
 template <typename Real>
 AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
                             const EmitterTable &table, const Real &x, const Real &y) {
+    const Shape &shape = scene.data.shapes[emitter.shape];
     if (emitter.rectangle)
         return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
                     y * spread<Real>(emitter.edge_v),
-                spread<Real>(table.normal)};
+                spread<Real>(table.normal), all_of<Real>(shape.first_face)};
 
-    const Shape &shape = scene.data.shapes[emitter.shape];
-    std::conditional_t<std::is_same_v<Real, float>, uint32_t, FaceNumbers> faces;
+    AreaPoint<Real> point;
+    FacesOf<Real> &faces = point.face;
     const Real reused = choose_face(table, shape.first_face, y, faces);
     const Corners<Real> corners = corners_of(scene, faces);
     const Vec3<Real> e0 = corners.b - corners.a, e1 = corners.c - corners.a;
     const Real root = square_root(maximum(Real(1.0f) - x, Real(0.0f)));
     const Real b0 = Real(1.0f) - root, b1 = root * reused;
 
-    AreaPoint<Real> point;
     for (int k = 0; k < 3; ++k)
         point.p[k] = fused(e0[k], b0, fused(e1[k], b1, corners.a[k]));
     if (shape.vertex_normals) {
@@ -114,6 +125,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     const EmitterTable &table = scene.emitter_tables[number];
     const Real zero(0.0f), one(1.0f);
     EmitterSample<Real> sample;
+    sample.target_face = all_of<Real>(NONE);
     MaskOf<Real> has_light(true);
     Real factor = zero;
 
@@ -144,12 +156,14 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     }
     case EmitterType::area: {
         if (!(table.inverse_area > 0))
-            return {spread<Real>({}), spread<Real>({}), spread<Real>({})};
+            return {spread<Real>({}), spread<Real>({}), spread<Real>({}),
+                    all_of<Real>(NONE)};
         const AreaPoint<Real> point = sample_area(scene, emitter, table, x, y);
         const Vec3<Real> to_light = point.p - p;
         const Real squared = dot(to_light, to_light);
         const Real distance = square_root(squared);
         sample.target = point.p;
+        sample.target_face = point.face;
         sample.direction = to_light * (one / distance);
         const Real cosine = dot(sample.direction, point.normal);
         const Real density = Real(table.inverse_area) * (squared / -cosine);

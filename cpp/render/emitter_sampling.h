@@ -4,6 +4,7 @@
 
 #include "base/simd.h"
 #include "render/prepared_scene.h"
+#include "render/surface.h"
 
 #include <cstdint>
 
@@ -14,6 +15,8 @@ struct EmitterSample {
     Vec3<Real> weight;    // unoccluded radiance over probability density; 0: no light here
     Vec3<Real> direction; // unit, towards the light; any value if there is none
     Vec3<Real> target;    // where the shadow ray ends; any value if there is none
+    FacesOf<Real> target_face; // where it lies on, but for rounding; NONE: on none. Of a
+                               // rectangle the first, whose plane is that of all
 };
 
 struct OneEmitterSample : EmitterSample<float> {

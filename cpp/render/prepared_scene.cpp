@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace mlrt {
 
@@ -13,6 +14,30 @@ float face_area(const Triangle &triangle) {
     return 0.5f * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
 }
 
+// How far, at most, faces of a rectangle lie off the plane of the first of them.
+float unevenness(const SceneData &scene, const Shape &shape) {
+    const auto triangle = [&](uint32_t i) -> const Triangle & {
+        return scene.tree->triangles[shape.first_face + i];
+    };
+    const Vec3d a(triangle(0).a);
+    const Vec3d normal =
+        normalize(cross(Vec3d(triangle(0).b) - a, Vec3d(triangle(0).c) - a));
+    double largest = 0;
+    for (uint32_t i = 1; i < shape.face_count; ++i)
+        for (const Vec3f &vertex : {triangle(i).a, triangle(i).b, triangle(i).c})
+            largest = std::max(largest, std::abs(dot(normal, Vec3d(vertex) - a)));
+    return std::nextafter(float(largest), std::numeric_limits<float>::infinity());
+}
+
+// Rays from a light end at surfaces, off by half a unit in the last place of their length:
+// from a light that is much farther away than the scene is large they would end too far
+// off, and begin at the surface instead.
+bool is_near(const Box3f &bounds, Vec3f light) {
+    constexpr float FAR = 16; // chosen: the offset of a hit grows up to that much
+    return max_component(abs(light)) <=
+           FAR * std::max(max_component(abs(bounds.lo)), max_component(abs(bounds.hi)));
+}
+
 EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
     EmitterTable table;
     if (emitter.type == EmitterType::spot) {
@@ -20,12 +45,16 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
         table.cos_beam = float(std::cos(double(emitter.beam_width)));
         table.inverse_transition = 1.0f / (emitter.cutoff_angle - emitter.beam_width);
     }
+    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
+        table.shadow_rays_from_light =
+            !scene.tree->bounds.empty() && is_near(scene.tree->bounds, emitter.position);
     if (emitter.type != EmitterType::area)
         return table;
 
     const Shape &shape = scene.shapes[emitter.shape];
     if (emitter.rectangle) {
         const Vec3f normal = cross(emitter.edge_u, emitter.edge_v);
+        table.unevenness = unevenness(scene, shape);
         const float area = length(normal);
         table.inverse_area = area > 0 ? 1.0f / area : 0.0f;
         // A mirrored rectangle glows on the side of its vertex normals, which is not that

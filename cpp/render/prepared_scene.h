@@ -18,6 +18,8 @@ struct EmitterTable {
     float cos_cutoff = 0;         // spot
     float cos_beam = 0;           // spot
     float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
+    float unevenness = 0; // rectangle: how far it lies off the plane of its first face
+    bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
 
 // What shading asks of a shape.

@@ -1,15 +1,30 @@
 #include "render/shadow.h"
 
-#include "render/shadow_offset.h"
-
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 namespace mlrt {
 
-ShadowRays::ShadowRays(const Emitter &emitter)
-    : from_light_(emitter.type == EmitterType::point || emitter.type == EmitterType::spot),
-      light_position_(emitter.position) {}
+ShadowRays::ShadowRays(const PreparedScene &scene, uint32_t number, ShadowOffset offset)
+    : light_position_(scene.data.emitters[number].position) {
+    const Emitter &emitter = scene.data.emitters[number];
+    if (offset == ShadowOffset::mitsuba) {
+        from_light_ =
+            emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+        begin_ = from_light_ ? SHADOW_EPSILON : 0.0f;
+        end_ = from_light_ ? 1.0f : 1.0f - SHADOW_EPSILON;
+        return;
+    }
+    from_light_ = scene.emitter_tables[number].shadow_rays_from_light;
+    begin_ = 0;
+    end_ = BEFORE_TARGET;
+    // All rays are parallel, wherever they start, and nothing is behind the light.
+    if (emitter.type == EmitterType::directional) {
+        parallel_ = -emitter.direction;
+        end_ = std::numeric_limits<float>::max();
+    }
+}
 
 void ShadowRays::reserve(size_t size) {
     if (ray_.size() >= size)
@@ -21,8 +36,8 @@ void ShadowRays::reserve(size_t size) {
         direction_[k].resize(size);
         light_[k].resize(size);
     }
-    t_min_.resize(size, from_light_ ? SHADOW_EPSILON : 0.0f);
-    t_max_.resize(size, from_light_ ? 1.0f : 1.0f - SHADOW_EPSILON);
+    t_min_.resize(size, begin_);
+    t_max_.resize(size, end_);
     occluded_.resize(size);
 }
 
@@ -34,7 +49,9 @@ void ShadowRays::append(LaneBits lanes, const UIntPacket &ray,
     for (int k = 0; k < 3; ++k) {
         if (!from_light_)
             store_compressed(&origin_[k][count_], from[k], lanes);
-        const FloatPacket way = from_light_ ? from[k] - to[k] : to[k] - from[k];
+        const FloatPacket way = parallel_     ? FloatPacket((*parallel_)[k])
+                                : from_light_ ? from[k] - to[k]
+                                              : to[k] - from[k];
         store_compressed(&direction_[k][count_], way, lanes);
         store_compressed(&light_[k][count_], light[k], lanes);
     }

@@ -5,8 +5,10 @@
 #include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/prepared_scene.h"
+#include "render/shadow_offset.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -15,10 +17,11 @@ namespace mlrt {
 //
 // For point and spot lights shadow rays start at the light, so that they share an origin
 // and form a beam; the interval leaves out the same share at the light's end as in Mitsuba,
-// where they run the other way.
+// where they run the other way. With robust offsets it leaves out nothing, and lights that
+// are far away are traced from the surfaces.
 class ShadowRays {
 public:
-    explicit ShadowRays(const Emitter &emitter);
+    ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset);
 
     void clear() { count_ = 0; }
 
@@ -48,6 +51,8 @@ private:
 
     bool from_light_;
     Vec3f light_position_;
+    std::optional<Vec3f> parallel_; // the direction of all rays, if they have the same
+    float begin_, end_;             // of their intervals
     uint32_t count_ = 0;
     // One array a component, with room for a packet behind the last entry.
     std::vector<uint32_t> ray_;

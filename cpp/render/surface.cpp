@@ -1,8 +1,5 @@
 #include "render/surface.h"
 
-#include <algorithm>
-#include <type_traits>
-
 namespace mlrt {
 
 namespace {
@@ -153,6 +150,13 @@ Corners<FloatPacket> normals_of(const PreparedScene &scene, const FaceNumbers &f
     return gather([&](uint32_t lane) { return normals_of(scene, faces[lane]); });
 }
 
+FaceNumbers faces_in(const UIntPacket &faces, LaneBits lanes) {
+    FaceNumbers numbers = to_lanes<uint32_t>(faces);
+    const uint32_t any = numbers[uint32_t(__builtin_ctz(lanes))];
+    for_each_lane(ALL_LANES & ~lanes, [&](uint32_t lane) { numbers[lane] = any; });
+    return numbers;
+}
+
 SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
                                 uint32_t face) {
     return on_one_face(scene, origin, direction, face);
@@ -178,10 +182,7 @@ hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
         left &= ~served;
     }
     if (left != 0) {
-        FaceNumbers numbers = to_lanes<uint32_t>(faces);
-        const uint32_t any = numbers[uint32_t(__builtin_ctz(left))];
-        for_each_lane(ALL_LANES & ~left, [&](uint32_t lane) { numbers[lane] = any; });
-        replace(point, left, on_faces(scene, origin, direction, numbers));
+        replace(point, left, on_faces(scene, origin, direction, faces_in(faces, left)));
     }
     return point;
 }

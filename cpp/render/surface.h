@@ -7,11 +7,18 @@
 #include "render/prepared_scene.h"
 
 #include <cstdint>
+#include <type_traits>
 
 namespace mlrt {
 
 // The faces of a packet.
 using FaceNumbers = LaneArray<uint32_t>;
+
+template <typename Real>
+using FacesOf = std::conditional_t<std::is_same_v<Real, float>, uint32_t, FaceNumbers>;
+
+// Lanes that are not given take the face of one that is; there must be one.
+FaceNumbers faces_in(const UIntPacket &faces, LaneBits lanes);
 
 template <typename Real>
 struct SurfacePoint {

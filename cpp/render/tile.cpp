@@ -2,6 +2,7 @@
 
 #include "render/emitter_sampling.h"
 #include "render/shadow_offset.h"
+#include "render/shadow_segment.h"
 
 #include <algorithm>
 #include <limits>
@@ -47,11 +48,14 @@ Vec3<FloatPacket> albedo_of(const PreparedScene &scene, const UIntPacket &shapes
 } // namespace
 
 TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                           const TraceOptions &options, TileTarget target)
-    : scene_(scene), streams_(streams), options_(options), target_(target),
+                           const TraceOptions &options, ShadowOffset offset,
+                           TileTarget target)
+    : scene_(scene), streams_(streams), options_(options), offset_(offset), target_(target),
       samples_(scene, streams, target.film.sampled(),
-               {target.film.needs_positions(), needs_light_numbers(scene)}),
-      shadows_(scene.data.emitters.begin(), scene.data.emitters.end()) {}
+               {target.film.needs_positions(), needs_light_numbers(scene)}) {
+    for (uint32_t emitter = 0; emitter < scene.data.emitters.size(); ++emitter)
+        shadows_.emplace_back(scene, emitter, offset);
+}
 
 void TileRenderer::render(const PixelGroup &group) {
     samples_.generate(group);
@@ -106,6 +110,7 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
 
 void TileRenderer::shade_hits() {
     HitPacket hit;
+    hit.origin = in_all_lanes(scene_.plane.origin);
     const UIntPacket lane_number(lane_numbers());
     for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
         hit.faces = load<UIntPacket>(&primitive_[first]);
@@ -166,10 +171,17 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
         lit &= not_black(light.weight) & to_bits(cos_light > zero);
         if (lit == 0)
             return;
-        const Vec3<FloatPacket> start =
-            offset_point(point.p, point.face_normal, light.target - point.p);
+        ShadowSegment<FloatPacket> segment;
+        if (offset_ == ShadowOffset::robust) {
+            const FaceNumbers faces = faces_in(hit.faces, hit.lanes);
+            segment = robust_segment<FloatPacket>(
+                scene_, {hit.origin, hit.direction, faces}, emitter, light);
+        } else {
+            segment = {offset_point(point.p, point.face_normal, light.target - point.p),
+                       light.target};
+        }
         const FloatPacket share = FloatPacket(std::numbers::inv_pi_v<float>) * cos_light;
-        shadows_[emitter].append(lit, hit.ray, start, light.target,
+        shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
                                  (albedo * share) * light.weight);
     });
 }
@@ -199,7 +211,10 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     });
     if (hidden != 0) {
         const Vec3<FloatPacket> start =
-            offset_point(point.p, point.face_normal, hit.direction);
+            offset_ == ShadowOffset::robust
+                ? robust_passage<FloatPacket>(
+                      scene_, {hit.origin, hit.direction, faces_in(hit.faces, hit.lanes)})
+                : offset_point(point.p, point.face_normal, hit.direction);
         for_each_lane(hidden, [&](uint32_t lane) {
             passing_.ray.push_back(rays[lane]);
             for (int k = 0; k < 3; ++k)
@@ -261,16 +276,15 @@ void TileRenderer::shade_passed(const PassingRays &passing,
     }
     if (hit.lanes == 0)
         return;
-    Vec3<FloatPacket> origins;
     for (int k = 0; k < 3; ++k) {
-        origins[k] = load<FloatPacket>(origin[k]);
+        hit.origin[k] = load<FloatPacket>(origin[k]);
         hit.direction[k] = load<FloatPacket>(d[k]);
     }
     hit.ray = load<UIntPacket>(rays);
     hit.faces = load<UIntPacket>(faces);
     hit.light_x = load<FloatPacket>(light_x);
     hit.light_y = load<FloatPacket>(light_y);
-    shade(hit, hit_surfaces(scene_, origins, hit.direction, hit.faces, hit.lanes));
+    shade(hit, hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes));
 }
 
 void TileRenderer::add_reflected_light() {

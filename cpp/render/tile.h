@@ -11,6 +11,7 @@
 #include "render/prepared_scene.h"
 #include "render/sampler.h"
 #include "render/shadow.h"
+#include "render/shadow_offset.h"
 #include "render/surface.h"
 
 #include <cstdint>
@@ -56,7 +57,7 @@ struct RenderCounters {
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const TraceOptions &options, TileTarget target);
+                 const TraceOptions &options, ShadowOffset offset, TileTarget target);
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
 
@@ -70,7 +71,7 @@ private:
     struct HitPacket {
         LaneBits lanes = 0;
         UIntPacket ray, faces;
-        Vec3<FloatPacket> direction;
+        Vec3<FloatPacket> origin, direction;
         FloatPacket light_x, light_y;
     };
 
@@ -97,6 +98,7 @@ private:
     const PreparedScene &scene_;
     const SampleStreams &streams_;
     TraceOptions options_;
+    ShadowOffset offset_;
     TileTarget target_;
     RenderCounters counters_;
     CameraSamples samples_;
