@@ -124,8 +124,8 @@ def offered() -> Iterator[None]:
     """Lets the Dr.Jit that is imported in this context find a libLLVM, if there is one.
 
     What a variable of the user says goes first, and a Dr.Jit that is there already is left
-    alone. Nothing is raised: native rendering needs no libLLVM. The environment is restored,
-    as a child process would have to load what the library needs by itself.
+    alone. Nothing is raised: native rendering needs no libLLVM. The environment is
+    restored, as a child process would have to load what the library needs by itself.
     """
     library = None
     if "drjit" not in sys.modules and not os.environ.get(VARIABLE):

@@ -141,8 +141,10 @@ def parser_config(variant: str) -> Any:
     return config
 
 
-def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
-    """Parses a scene file with values for its $parameters.
+def parse_file(
+    path: Path, defines: Mapping[str, object], variant: str = READING_VARIANT
+) -> ParsedScene:
+    """Parses a scene file with values for its $parameters, to be loaded in a variant.
 
     Raises SceneError if it does not exist or is malformed, if a parameter is not defined,
     or if one of `defines` is not used.
@@ -151,7 +153,7 @@ def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
         raise SceneError(f"scene '{path}' is a folder: name the XML file in it")
     if not path.exists():
         raise SceneError(f"scene file '{path}' does not exist: check its path")
-    config = parser_config(READING_VARIANT)
+    config = parser_config(variant)
     values = {key: str(value) for key, value in defines.items()}
 
     def parse() -> Any:
@@ -165,8 +167,9 @@ def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
     return ParsedScene(config, state, described(state), path.parent, str(path))
 
 
-def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
-    """Parses a dictionary as ``mi.load_dict`` takes it.
+def parse_dict(scene: Mapping[str, Any], variant: str = READING_VARIANT) -> ParsedScene:
+    """Parses a dictionary as ``mi.load_dict`` takes it, to be loaded in the variant of the
+    objects that it holds, else in `variant`.
 
     Raises SceneError if it is malformed, or holds objects of an unusable variant.
     """
@@ -178,7 +181,7 @@ def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
             f"({', '.join(sorted(variants))}): "
             "load all of them in one"
         )
-    variant = variants.pop() if variants else READING_VARIANT
+    variant = variants.pop() if variants else variant
     if not variant.endswith("_rgb"):
         raise SceneError(
             f"the scene {name} holds objects of the variant {variant}: load them in an "
@@ -256,6 +259,23 @@ def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
     Integrators are not loaded: they are taken over, and may be unknown in the reading
     variant.
     """
+    by_id = numbered(parsed)
+    register_collector(parsed.config.variant)
+    root = parsed.state.nodes[0]
+    root.props.set_plugin_name(COLLECTOR)
+    root.type = mi.ObjectType.Texture
+    return loaded(parsed).parts, by_id
+
+
+def instantiate_scene(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
+    """Loads a parsed scene as a scene of Mitsuba, and tells which element each object came
+    from, by its id. Its integrator is a `direct` that stands in for the scene's own."""
+    by_id = numbered(parsed)
+    return loaded(parsed), by_id
+
+
+def numbered(parsed: ParsedScene) -> dict[str, Element]:
+    """Gives all nodes ids by which to find their elements, and takes integrators out."""
     by_id = {}
     for number, (node, element) in enumerate(
         zip(parsed.state.nodes, parsed.elements, strict=True)
@@ -264,14 +284,14 @@ def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
             node.props = mi.Properties("direct")
         node.props.set_id(f"n{number}")
         by_id[f"n{number}"] = element
-    register_collector(parsed.config.variant)
-    root = parsed.state.nodes[0]
-    root.props.set_plugin_name(COLLECTOR)
-    root.type = mi.ObjectType.Texture
+    return by_id
+
+
+def loaded(parsed: ParsedScene) -> Any:
+    """The object that the root of a parsed scene describes; raises SceneError."""
     with resolving_from(parsed.folder):
-        collector: Any = reported(
+        return reported(
             lambda: mi.parser.instantiate(parsed.config, parsed.state),
             parsed.name,
             parsed.elements,
         )
-    return collector.parts, by_id

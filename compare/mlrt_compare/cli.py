@@ -59,6 +59,7 @@ def compare_scene(arguments: Sequence[str]) -> int:
         sensor=options.sensor,
         resolution=options.resolution,
         threads=options.threads,
+        shading=options.shading,
         defines=dict(options.define),
     )
     check_output_folder(options.output)
@@ -152,6 +153,11 @@ def scene_parser() -> argparse.ArgumentParser:
         type=at_least(1),
         metavar="THREADS",
         help="of both sides (all)",
+    )
+    parser.add_argument(
+        "--shading",
+        choices=("auto", "native", "mitsuba"),
+        help="who shades MLRT's image (the scene's option, else auto)",
     )
     parser.add_argument(
         "-o",

@@ -43,14 +43,14 @@ class DirectLight:
         bsdf_samples: int,
         hide_emitters: bool,
     ) -> None:
-        """module: of the scene's variant. One of the numbers of samples is at least 1."""
+        """module: of the scene's variant. Without samples only hits are of interest."""
         self._module = module
         self._scene = scene
         self._hits = hits
         self._emitter_samples = emitter_samples
         self._bsdf_samples = bsdf_samples
         self._hide_emitters = hide_emitters
-        total = emitter_samples + bsdf_samples
+        total = max(1, emitter_samples + bsdf_samples)
         self._emitter_share = emitter_samples / total
         self._bsdf_share = bsdf_samples / total
 

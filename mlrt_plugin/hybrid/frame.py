@@ -10,6 +10,7 @@ import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
+from .. import mitsuba_objects as objects
 from .direct_light import DirectLight, PrimaryHits
 from .samplers import IndependentStream, mitsubas_sampler
 
@@ -137,7 +138,7 @@ def render_frame(
     aovs: Sequence[str],
     progress: Callable[[float], object] | None,
 ) -> Frame:
-    """Renders what a sensor sees; `seed` includes that of its sampler.
+    """Renders what a sensor sees; to `seed` that of its sampler is added.
 
     The image of sampler `independent` depends on the passes only in its rounding. Other
     samplers cannot be entered in the middle, so they are seeded anew for each pass.
@@ -146,12 +147,12 @@ def render_frame(
     frame = Frame(module, film, aovs, spp)
     independent = sampler.class_name() == "IndependentSampler"
     total = frame.area.pixels * spp
-    base_seed = int(sampler.seed_value()) if hasattr(sampler, "seed_value") else 0
+    own_seed = (seed + int(objects.described(sampler, "base_seed", "0"))) & 0xFFFFFFFF
     for number, (first, count) in enumerate(passes(frame.area, spp, not independent)):
         numbers = (
-            IndependentStream(module, seed, first, count)
+            IndependentStream(module, own_seed, first, count)
             if independent
-            else mitsubas_sampler(sampler, spp, seed - base_seed + number, count)
+            else mitsubas_sampler(sampler, spp, (seed + number) & 0xFFFFFFFF, count)
         )
         place, ray, weight = camera_rays(module, sensor, numbers, frame, first, count)
         color, primary = light.radiance(ray, numbers)

@@ -1,4 +1,4 @@
-"""What rays can hit: the meshes of a loaded scene by the kd-tree, its other shapes by Mitsuba.
+"""What rays can hit: the meshes of a scene by the kd-tree, its other shapes by Mitsuba.
 
 Shapes that are not triangle meshes (spheres, disks, cylinders, curves, instances) stay in a
 scene of their own, which Mitsuba intersects.
@@ -81,7 +81,7 @@ def copied(kind: type, values: npt.NDArray[Any]) -> Any:
     Dr.Jit would go on using the memory of NumPy, and compile a kernel anew where that is
     aligned in another way.
     """
-    array = dr.empty(kind, len(values))
+    array: Any = dr.empty(kind, len(values))
     np.copyto(array.numpy(), values)
     return array
 
@@ -97,8 +97,9 @@ class HitScene:
         others: Any,
         options: Mapping[str, Any],
     ) -> None:
-        """scene: loaded in `llvm_ad_rgb`. tree: of `faces`, a tree of the core; both are None
-        if there is no mesh. others: what `other_shapes` gives. options: of `TraceOptions`.
+        """scene: loaded in `llvm_ad_rgb`. tree: of `faces`, a tree of the core; both are
+        None if there is no mesh. others: what `other_shapes` gives. options: of
+        `TraceOptions`.
         """
         self._module = objects.variant_module(scene)
         self._shapes = scene.shapes_dr()
@@ -152,8 +153,9 @@ class HitScene:
         """Rays as the core takes them; those that are not active can hit nothing."""
         module = self._module
         count = dr.width(ray, active)
-        origin, along = dr.ravel(ray.o), dr.ravel(ray.d)
-        end = dr.select(active, ray.maxt, 0) + dr.zeros(module.Float, count)
+        origin: Any = dr.ravel(ray.o)
+        along: Any = dr.ravel(ray.d)
+        end: Any = dr.select(active, ray.maxt, 0) + dr.zeros(module.Float, count)
         dr.eval(origin, along, end)
         points, directions = (
             np.ascontiguousarray(np.broadcast_to(a.numpy().reshape(-1, 3), (count, 3)))

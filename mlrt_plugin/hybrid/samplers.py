@@ -1,7 +1,7 @@
 """Random numbers of a part of an image, as Mitsuba draws them for the whole of it.
 
-Mitsuba's llvm variants draw numbers for all samples of an image at once: sample s of pixel p
-is number p * spp + s of that wavefront. Here a wavefront is rendered in passes.
+Mitsuba's llvm variants draw numbers for all samples of an image at once: sample s of
+pixel p is number p * spp + s of that wavefront. Here a wavefront is rendered in passes.
 """
 
 from __future__ import annotations
@@ -9,11 +9,6 @@ from __future__ import annotations
 from typing import Any
 
 import drjit as dr
-
-from ..errors import MlrtError
-
-LARGEST_WAVEFRONT = 2**32
-"""Numbers of samples have 32 bits in Mitsuba."""
 
 
 class IndependentStream:
@@ -50,13 +45,3 @@ def possible_spp(sampler: Any, spp: int) -> int:
     copy = sampler.clone()
     copy.set_sample_count(spp)
     return int(copy.sample_count())
-
-
-def check_wavefront(pixels: int, spp: int) -> None:
-    """Raises MlrtError for more samples than have numbers."""
-    if pixels * spp > LARGEST_WAVEFRONT:
-        raise MlrtError(
-            f"spp = {spp} makes {pixels * spp} samples in {pixels} pixels, and there are "
-            f"random numbers for 2**32: take at most {LARGEST_WAVEFRONT // pixels}, and "
-            "average images of several seeds"
-        )

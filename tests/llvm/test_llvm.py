@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 import mlrt_llvm as llvm
 
 COMPILER = shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")
