@@ -119,8 +119,6 @@ class PreparedScene:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
         samples = checked_spp(self.arrays.spp if spp is None else spp)
-        film = self.arrays.film
-        check_sample_count(film.crop_width * film.crop_height, samples)
         depth = self.lighting.integrator == "depth"
         wanted = list(
             dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(self.lighting))])
@@ -301,17 +299,6 @@ def checked_spp(spp: int) -> int:
     if spp > 0xFFFFFFFF:
         raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
     return spp
-
-
-def check_sample_count(pixels: int, spp: int) -> None:
-    """Raises MlrtError for more samples in an image than Mitsuba has random numbers for:
-    they are numbered by 32 bits."""
-    if pixels * spp > 2**32:
-        raise MlrtError(
-            f"spp = {spp} makes {pixels * spp} samples in {pixels} pixels, and there are "
-            f"random numbers for 2**32: take at most {2**32 // pixels}, and average images "
-            "of several seeds"
-        )
 
 
 def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,10 +12,8 @@ import numpy.typing as npt
 
 from .. import mitsuba_objects as objects
 from .direct_light import DirectLight, PrimaryHits
-from .samplers import IndependentStream, mitsubas_sampler
+from .samplers import IndependentStream, Pass, mitsubas_sampler, passes
 
-SAMPLES_OF_PASS = 2**20
-"""Samples that are on their way at a time; chosen: they take some hundred bytes each."""
 AOV_CHANNELS = {"depth": 1, "normal": 3}
 """Numbers a pixel of those AOVs that are filtered as colours are."""
 
@@ -68,10 +66,9 @@ class Frame:
             dr.full(module.Int32, -1, self.area.pixels) if "prim" in aovs else None
         )
 
-    def put(self, first: int, place: Any, color: Any, primary: PrimaryHits) -> None:
-        """Adds samples, of which the first has the number `first`, at places in pixels."""
+    def put(self, part: Pass, place: Any, color: Any, primary: PrimaryHits) -> None:
+        """Adds the samples of a pass at places in pixels."""
         module, si = self._module, primary.interaction
-        count = dr.width(place)
         values = {
             "depth": lambda: [dr.select(si.is_valid(), si.t, 0)],
             "normal": lambda: list(dr.select(si.is_valid(), si.sh_frame.n, 0)),
@@ -79,12 +76,11 @@ class Frame:
         channels = [color.x, color.y, color.z]
         for name in self._filtered:
             channels += values[name]()
-        self._block.put(place, [*channels, dr.full(module.Float, 1, count)])
+        self._block.put(place, [*channels, dr.full(module.Float, 1, part.count)])
         if self._faces is not None:
-            number = dr.arange(module.UInt32, count) + dr.opaque(module.UInt32, first)
-            pixel = number // dr.opaque(module.UInt32, self.spp)
-            is_first = number == pixel * dr.opaque(module.UInt32, self.spp)
-            dr.scatter(self._faces, primary.face, pixel, is_first)
+            pixel, sample = part.pixel_and_sample(module)
+            first = (sample == 0) & (dr.opaque(module.UInt32, part.wavefront) == 0)
+            dr.scatter(self._faces, primary.face, pixel, first)
             dr.eval(self._faces)
         dr.eval(self._block.tensor())
 
@@ -115,19 +111,6 @@ class Frame:
         return np.divide(channels, weight, out=np.zeros_like(channels), where=weight != 0)
 
 
-def passes(area: FilmArea, spp: int, whole_pixels: bool) -> Iterator[tuple[int, int]]:
-    """Numbers of samples in runs of at most SAMPLES_OF_PASS: the first, and how many.
-
-    whole_pixels: whether all samples of a pixel stay together, however many they are.
-    """
-    size = SAMPLES_OF_PASS
-    if whole_pixels:
-        size = max(1, SAMPLES_OF_PASS // spp) * spp
-    total = area.pixels * spp
-    for first in range(0, total, size):
-        yield first, min(size, total - first)
-
-
 def render_frame(
     module: Any,
     sensor: Any,
@@ -146,32 +129,33 @@ def render_frame(
     film, sampler = sensor.film(), sensor.sampler()
     frame = Frame(module, film, aovs, spp)
     independent = sampler.class_name() == "IndependentSampler"
-    total = frame.area.pixels * spp
     own_seed = (seed + int(objects.described(sampler, "base_seed", "0"))) & 0xFFFFFFFF
-    for number, (first, count) in enumerate(passes(frame.area, spp, not independent)):
+    done = 0
+    for number, part in enumerate(passes(frame.area.pixels, spp, not independent)):
         numbers = (
-            IndependentStream(module, own_seed, first, count)
+            IndependentStream(module, own_seed, part)
             if independent
-            else mitsubas_sampler(sampler, spp, (seed + number) & 0xFFFFFFFF, count)
+            else mitsubas_sampler(sampler, spp, (seed + number) & 0xFFFFFFFF, part.count)
         )
-        place, ray, weight = camera_rays(module, sensor, numbers, frame, first, count)
+        place, ray, weight = camera_rays(module, sensor, numbers, frame, part)
         color, primary = light.radiance(ray, numbers)
-        frame.put(first, place, weight * color, primary)
+        frame.put(part, place, weight * color, primary)
+        done += part.count
         if progress is not None:
-            progress((first + count) / total)
+            progress(done / (frame.area.pixels * spp))
     return frame
 
 
 def camera_rays(
-    module: Any, sensor: Any, numbers: Any, frame: Frame, first: int, count: int
+    module: Any, sensor: Any, numbers: Any, frame: Frame, part: Pass
 ) -> tuple[Any, Any, Any]:
-    """Rays of a run of samples: where they count on the film, in pixels, the rays, and what
-    their radiance is multiplied by."""
+    """Rays of the samples of a pass: where they count on the film, in pixels; the rays; and
+    what their radiance is multiplied by."""
     film, area = sensor.film(), frame.area
-    index = dr.arange(module.UInt32, count) + dr.opaque(module.UInt32, first)
-    index //= dr.opaque(module.UInt32, frame.spp)
-    row = index // dr.opaque(module.UInt32, area.width)
-    column = index - row * dr.opaque(module.UInt32, area.width)
+    pixel, _ = part.pixel_and_sample(module)
+    width = dr.opaque(module.UInt32, area.width)
+    row = pixel // width
+    column = pixel - row * width
     corner = module.Vector2f(
         module.Float(module.Int32(column) + area.x),
         module.Float(module.Int32(row) + area.y),

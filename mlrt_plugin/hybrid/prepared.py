@@ -20,7 +20,6 @@ from ..render import (
     RenderResult,
     as_depth,
     check_aovs,
-    check_sample_count,
     checked_seed,
     checked_spp,
 )
@@ -29,7 +28,7 @@ from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree
 from ..tree_report import tree_report
 from .direct_light import DirectLight
-from .frame import FilmArea, render_frame
+from .frame import render_frame
 from .hit_scene import HitScene, MeshFaces, mesh_faces, other_shapes
 from .loading import MitsubaScene, load_scene
 from .samplers import possible_spp
@@ -109,7 +108,6 @@ class PreparedHybrid:
         lighting, loaded, sensor = self.lighting, self.loaded, self.loaded.sensor
         sampler = sensor.sampler()
         asked = checked_spp(self.spp if spp is None else spp)
-        check_sample_count(FilmArea.of(sensor.film()).pixels, asked)
         samples = possible_spp(sampler, asked)
         trace = {**lighting.own_options(TRACE_OPTIONS), **options}
         hits = HitScene(loaded.scene, self.tree, self.faces, self.others, trace)

@@ -239,7 +239,7 @@ def test_too_much_of_everything(
 def test_warnings(scene_file: SceneFile) -> None:
     path = scene_file(integrator='<integrator type="path"/>')
     with pytest.warns(MlrtWarning, match="max_depth = -1") as caught:
-        render(path)
+        render(path, force_direct=True)
     assert [w.filename for w in caught] == [__file__]
 
 

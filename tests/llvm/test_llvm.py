@@ -142,10 +142,9 @@ assert drjit.detail.llvm_version() == chosen.version, drjit.detail.llvm_version(
 
 def test_too_late_is_said_when_drjit_has_no_usable_llvm(tmp_path: Path) -> None:
     program = """
-import os
-os.environ["DRJIT_LIBLLVM_PATH"] = "/nonexistent/libLLVM.so"
 import drjit
 import mlrt_llvm as llvm
+llvm.find = lambda: llvm.LibLlvm("libLLVM.so.20", (20, 1, 0))
 drjit.detail.llvm_version = lambda: (15, 0, 7)
 try:
     llvm.activate()
