@@ -17,6 +17,7 @@ import mitsuba as mi
 
 from . import __version__
 from .info import scene_report
+from .parsing import resolving_from
 from .render_command import add_render_options, add_shading, complaint, run_render
 from .tree_command import add_build_options, add_tree_cache, run_tree
 
@@ -41,6 +42,14 @@ def definition(text: str) -> tuple[str, str]:
     return key, value
 
 
+def folders(text: str) -> list[Path]:
+    paths = [Path(part) for part in text.split(";") if part]
+    for path in paths:
+        if not path.is_dir():
+            raise argparse.ArgumentTypeError(f"'{path}' is no folder")
+    return paths
+
+
 def make_parser() -> argparse.ArgumentParser:
     parser = Parser(prog="mlrt", description="Multi-level ray tracing of Mitsuba 3 scenes.")
     parser.add_argument("--version", action="version", version=f"mlrt {__version__}")
@@ -54,6 +63,14 @@ def make_parser() -> argparse.ArgumentParser:
         default=[],
         metavar="KEY=VALUE",
         help="value of $KEY in the scene; may be repeated",
+    )
+    common.add_argument(
+        "-a",
+        "--append",
+        type=folders,
+        default=[],
+        metavar="DIR[;DIR]...",
+        help="folders in which files of the scene are looked for as well",
     )
     common.add_argument("-v", "--verbose", action="store_true", help="tell more")
     one_scene = Parser(add_help=False)
@@ -102,7 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     level = mitsuba.log_level()
     mitsuba.set_log_level(mi.LogLevel.Info if arguments.verbose else mi.LogLevel.Error)
     try:
-        COMMANDS[arguments.command](arguments)
+        with resolving_from(*arguments.append):
+            COMMANDS[arguments.command](arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
         print("mlrt: interrupted", file=sys.stderr)

@@ -79,6 +79,8 @@ def loaded_lighting(scene: Any) -> Lighting:
 def lighting_for(parameters: dict[str, Any], integrator: str) -> Lighting:
     """What an integrator asks for; `parameters` are its properties."""
     shading = int(parameters.get("shading_samples", 1))
+    if integrator == "path" and parameters.get("max_depth", -1) in (0, 1):
+        shading = 0  # no more than what glows
     return Lighting(
         integrator=integrator,
         emitter_samples=int(parameters.get("emitter_samples", shading)),
@@ -112,13 +114,10 @@ def check_integrator(
                     f"{name} has no parameter '{parameter}': choose from "
                     f"{', '.join(OWN_PARAMETERS)}"
                 )
-    if lighting.integrator == "path" and parameters.get("max_depth", -1) in (0, 1):
-        raise UnsupportedFeature(
-            f"{name} has max_depth = {parameters['max_depth']}, which leaves out direct "
-            "illumination, and that is always rendered: set max_depth to 2"
-        )
+    if lighting.integrator == "path" and parameters.get("max_depth", -1) == 0:
+        raise SceneError(f"{name} has max_depth = 0, so its image is black: set it to 2")
     counts = lighting.emitter_samples, lighting.bsdf_samples
-    if min(counts) < 0 or max(counts) < 1:
+    if min(counts) < 0 or (max(counts) < 1 and lighting.integrator != "path"):
         raise SceneError(
             f"{name} has emitter_samples = {counts[0]} and bsdf_samples = {counts[1]}: one "
             "of them must be at least 1, and none negative"
@@ -137,7 +136,7 @@ def what_is_missing(lighting: Lighting) -> str:
     integrator, parameters = lighting.integrator, lighting.parameters
     if integrator == "path":
         depth = int(parameters.get("max_depth", -1))
-        return "" if depth == 2 else f"{MISSING['path']} (max_depth = {depth})"
+        return "" if depth in (1, 2) else f"{MISSING['path']} (max_depth = {depth})"
     if integrator == "aov":
         absent = [name for name in parameters.get("aovs", ()) if name not in AOV_NAMES]
         if absent:
@@ -171,9 +170,10 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
         return ""
     name = named(features, lighting)
     if lighting.emitter_samples == 0:
+        what = "max_depth" if lighting.integrator == "path" else "emitter_samples"
         return (
-            f"{name} has emitter_samples = 0, and light is found by emitter samples only: "
-            "set emitter_samples to 1"
+            f"{name} takes no emitter samples, and light is found by those only: raise "
+            f"its {what}"
         )
     counts = lighting.emitter_samples, lighting.bsdf_samples
     if lighting.integrator == "mlrt" and counts != (1, 0):

@@ -29,7 +29,10 @@ REMEDIES = (
     ("undefined parameter", "give it a value by -D or by a <default> in the scene"),
     ("unreferenced propert", "remove the property or mend its name"),
     ("unresolved reference", "mend the reference"),
-    ("file not found", "check the path of the file, which is relative to the scene"),
+    (
+        "file not found|No such file",
+        "check the path of the file, which is relative to the scene",
+    ),
     ("Could not map", "check that the file is not empty and can be read"),
     (
         "Storing new normals",
@@ -56,12 +59,15 @@ T = TypeVar("T")
 
 @dataclass
 class ParsedScene:
-    """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``."""
+    """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``.
+
+    resolver: where its files are looked for, those of its <path> elements included.
+    """
 
     config: Any
     state: Any
     elements: list[Element]
-    folder: Path
+    resolver: Any
     name: str
 
     @property
@@ -108,12 +114,26 @@ def reported(action: Callable[[], T], name: str, elements: Sequence[Element] = (
         raise SceneError(f"{message}; {remedy}") from error
 
 
+def resolver_from(*folders: Path) -> Any:
+    """A resolver that looks for files in these folders first, as Mitsuba's own loader looks
+    in that of the scene, and then where the process does."""
+    resolver = mitsuba.FileResolver(mitsuba.file_resolver())
+    for folder in reversed(folders):
+        resolver.prepend(str(folder))
+    return resolver
+
+
 @contextmanager
-def resolving_from(folder: Path) -> Iterator[None]:
-    """Lets Mitsuba look for files in a folder first, as its own loader does."""
+def resolving_from(*folders: Path) -> Iterator[None]:
+    """Lets Mitsuba look for files in these folders first."""
+    with resolving_by(resolver_from(*folders)):
+        yield
+
+
+@contextmanager
+def resolving_by(resolver: Any) -> Iterator[None]:
+    """Lets Mitsuba look for files as a resolver says."""
     before = mitsuba.file_resolver()
-    resolver = mitsuba.FileResolver(before)
-    resolver.prepend(str(folder))
     mitsuba.set_file_resolver(resolver)
     try:
         yield
@@ -162,9 +182,10 @@ def parse_file(
         mi.parser.transform_resolve(config, state)
         return state
 
-    with resolving_from(path.parent):
+    resolver = resolver_from(path.parent)
+    with resolving_by(resolver):
         state = reported(parse, str(path))
-    return ParsedScene(config, state, described(state), path.parent, str(path))
+    return ParsedScene(config, state, described(state), resolver, str(path))
 
 
 def parse_dict(scene: Mapping[str, Any], variant: str = READING_VARIANT) -> ParsedScene:
@@ -202,7 +223,7 @@ def parse_dict(scene: Mapping[str, Any], variant: str = READING_VARIANT) -> Pars
             for child_name, element in elements[0].children:
                 if child_name == key:
                     element.plugin = "mlrt"
-    return ParsedScene(config, state, elements, Path(), name)
+    return ParsedScene(config, state, elements, resolver_from(Path()), name)
 
 
 def is_own_integrator(value: object) -> bool:
@@ -289,7 +310,7 @@ def numbered(parsed: ParsedScene) -> dict[str, Element]:
 
 def loaded(parsed: ParsedScene) -> Any:
     """The object that the root of a parsed scene describes; raises SceneError."""
-    with resolving_from(parsed.folder):
+    with resolving_by(parsed.resolver):
         return reported(
             lambda: mi.parser.instantiate(parsed.config, parsed.state),
             parsed.name,

@@ -250,7 +250,7 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
 def check_files(parsed: parsing.ParsedScene) -> None:
     """Raises SceneError for mesh files whose indices would make Mitsuba crash."""
     checked = set()
-    with parsing.resolving_from(parsed.folder):
+    with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
             filename = element.properties.get("filename")
             if element.kind != "shape" or filename is None:

@@ -55,6 +55,12 @@ class MlrtRenderer:
         lighting = self._prepared.lighting
         if lighting.integrator == "depth":
             return {"type": "depth"}
+        if lighting.emitter_samples == lighting.bsdf_samples == 0:
+            return {
+                "type": "path",
+                "max_depth": 1,
+                "hide_emitters": lighting.hide_emitters,
+            }
         return {
             "type": "direct",
             "emitter_samples": lighting.emitter_samples if self.by_mitsuba else 1,
