@@ -15,7 +15,19 @@ SENSORS = ("perspective",)
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "gaussian")
 SAMPLERS = ("independent",)
-CONSTANT_TEXTURES = ("uniform", "srgb", "d65", "regular", "irregular")
+CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
+
+NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
+REFUSED = {
+    ("texture", "regular"): NOT_RGB,
+    ("texture", "irregular"): NOT_RGB,
+    ("texture", "blackbody"): NOT_RGB,
+    ("emitter", "timed_sunsky"): "Mitsuba 3.9.1 cannot sample it in its llvm variants",
+    ("sensor", "batch"): "render its sensors one by one, each declared in the scene",
+    ("sensor", "irradiancemeter"): "sensors that belong to shapes cannot be chosen",
+    ("film", "specfilm"): "it records spectra, and images are RGB: use hdrfilm",
+}
+"""Plugins that are rendered neither natively nor by Mitsuba, and why."""
 
 NATIVE = {
     "shape": SHAPES,
@@ -64,6 +76,15 @@ def reason_against(element: Element) -> str:
     ):
         return "only diffuse materials can be nested in it so far"
     return ""
+
+
+def refuse_refused(scene: Element, sensor: int) -> None:
+    """Raises UnsupportedFeature for what not even Mitsuba's plugins help with."""
+    chosen = list(scene.children_of("sensor"))[sensor]
+    for element in used_elements(scene, sensor):
+        reason = REFUSED.get((element.kind, element.plugin), "")
+        if reason and (element.kind != "sensor" or element is chosen):
+            raise UnsupportedFeature(f"{element} is not supported: {reason}")
 
 
 def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import mlrt_llvm
 
 from .errors import SceneError
-from .features import SAMPLERS, native_warnings
+from .features import REFUSED, SAMPLERS, native_warnings
 from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
 from .scene_import import SceneSource, SceneSummary, import_scene, summarise
 from .shading_choice import choice_for
@@ -69,7 +69,9 @@ def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) ->
     if kind == "integrator":
         return "taken over" if plugin in TAKEN_OVER else "direct illumination only"
     if not path_is_native:
-        return "by Mitsuba"
+        if (kind, plugin) in REFUSED:
+            return "not supported"
+        return "hits native" if kind == "shape" and is_native else "by Mitsuba"
     if kind == "sampler" and plugin not in SAMPLERS:
         return "replaced"
     return "native" if is_native else "not supported"

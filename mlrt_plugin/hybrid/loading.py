@@ -18,8 +18,6 @@ from ..errors import SceneError, UnsupportedFeature
 from ..scene_arrays import Lighting
 
 VARIANT = "llvm_ad_rgb"
-COMPOUND_SENSORS = ("batch",)
-"""Sensors whose film is made up of those of others."""
 IGNORED = {
     "medium": "participating media have no effect on direct illumination as `direct` "
     "renders it",
@@ -88,7 +86,7 @@ def load_scene(
     found = features.list_features(root, sensor)
     lighting = lighting or scene_import.lighting_of(source, root)
     integrators.check_integrator(found, lighting, force_direct)
-    check_sensor(list(root.children_of("sensor"))[sensor])
+    features.refuse_refused(root, sensor)
     check_numbers(root, sensor)
     scene_import.check_transforms(parsed, sensor)
     scene_import.check_files(parsed)
@@ -126,6 +124,7 @@ def of_loaded(
     found = features.list_features(root, number)
     lighting = lighting or scene_import.lighting_of(scene, root)
     integrators.check_integrator(found, lighting, force_direct)
+    features.refuse_refused(root, number)
     eye = sensors[number]
     size = tuple(int(n) for n in eye.film().size())
     if resolution is not None and resolution != size:
@@ -139,19 +138,9 @@ def of_loaded(
     return MitsubaScene(scene, eye, names, lighting, tuple(warnings))
 
 
-def check_sensor(sensor: Element) -> None:
-    """Raises UnsupportedFeature for a sensor that is no single camera."""
-    if sensor.plugin in COMPOUND_SENSORS:
-        raise UnsupportedFeature(
-            f"{sensor} is not supported: render its sensors one by one, with -s"
-        )
-
-
 def check_film(film: Any, name: str) -> None:
-    """Raises UnsupportedFeature for a film that holds no colours, and SceneError for one
-    that does not fit into memory."""
-    if objects.plugin_name(film) != "hdrfilm":
-        raise UnsupportedFeature(f"{name} is not supported: only hdrfilm is")
+    """Raises SceneError for a film that does not fit into memory, or whose filter has no
+    sensible size."""
     width, height = (int(n) for n in film.crop_size())
     camera.check_size(width, height, name)
     radius = float(film.rfilter().radius())

@@ -12,7 +12,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from ..errors import MlrtError, MlrtWarning
+from ..errors import MlrtError, MlrtWarning, SceneError, one_sentence
 from ..integrators import own_aovs
 from ..options import BUILD_OPTIONS, TRACE_OPTIONS
 from ..render import (
@@ -122,17 +122,24 @@ class PreparedHybrid:
         )
         wanted = list(dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(lighting))]))
         start = time.perf_counter()
-        with dr.suspend_grad():  # type: ignore[no-untyped-call]
-            frame = render_frame(
-                loaded.module,
-                sensor,
-                light,
-                spp=samples,
-                seed=checked_seed(seed, 0),
-                aovs=wanted,
-                progress=progress,
-            )
-            image, images = frame.image(), frame.aovs()
+        try:
+            with dr.suspend_grad():  # type: ignore[no-untyped-call]
+                frame = render_frame(
+                    loaded.module,
+                    sensor,
+                    light,
+                    spp=samples,
+                    seed=checked_seed(seed, 0),
+                    aovs=wanted,
+                    progress=progress,
+                )
+                image, images = frame.image(), frame.aovs()
+        except RuntimeError as error:
+            first, _, _ = str(error).partition("\n")
+            raise SceneError(
+                f"Mitsuba's plugins cannot shade the scene: {one_sentence(first)}; find "
+                "the one at fault by taking materials, textures and lights out"
+            ) from error
         if depth:
             image = as_depth(images["depth"])
             images = {name: images[name] for name in aovs}

@@ -196,7 +196,9 @@ def test_arguments(scene_file: SceneFile) -> None:
         with pytest.raises(MlrtError, match="seed = "):
             render(path, seed=seed)
     with pytest.raises(UnsupportedFeature, match="sphere"):
-        render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'))
+        render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'), shading="native")
+    with pytest.raises(MlrtError, match="shading = 'fast' does not exist"):
+        render(path, shading="fast")
 
 
 @pytest.mark.parametrize(
