@@ -24,6 +24,7 @@ MISSING = {
     "moment": "the second moments",
     "stokes": "polarisation",
     "direct_projective": "the derivatives of moving edges",
+    "volprim_rf_basic": "radiance fields",
 }
 """What an integrator computes and `direct` does not."""
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
@@ -152,7 +153,8 @@ def what_is_missing(lighting: Lighting) -> str:
         return ""
     if integrator in TAKEN_OVER:
         return ""
-    return MISSING.get(integrator, f"what '{integrator}' computes beyond that")
+    unknown = f"what '{integrator}' computes, which is none of Mitsuba's own integrators,"
+    return MISSING.get(integrator, unknown)
 
 
 def own_aovs(lighting: Lighting) -> tuple[str, ...]:

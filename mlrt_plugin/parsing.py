@@ -44,7 +44,8 @@ REMEDIES = (
     ("Plugin .* not found", "check the spelling of the plugin's type"),
     ("missing version", 'add version="3.0.0" to the <scene>'),
     ("Parsing of XML", "mend the XML there"),
-    (r"read \d+ out of", "the mesh file is truncated, export it anew"),
+    (r"read \d+ out of", "the file is truncated, export it anew"),
+    ("libpng|JPEG|OpenEXR", "the image is damaged, export it anew"),
     (
         "past the end of the stream|inflate|bytes required",
         "the mesh file is damaged, export it anew",

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 
 import mlrt_llvm
@@ -16,8 +17,11 @@ from .. import mitsuba_objects as objects
 from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
 from ..scene_arrays import Lighting
+from .mitsuba_log import captured_warnings
 
 VARIANT = "llvm_ad_rgb"
+LARGEST_INSTANCE_COUNT = 500
+"""Chosen: Mitsuba's llvm variants take about a quarter of a second to compile each."""
 IGNORED = {
     "medium": "participating media have no effect on direct illumination as `direct` "
     "renders it",
@@ -87,6 +91,7 @@ def load_scene(
     lighting = lighting or scene_import.lighting_of(source, root)
     integrators.check_integrator(found, lighting, force_direct)
     features.refuse_refused(root, sensor)
+    check_instances(sum(e.plugin == "instance" for e in root.children_of("shape")))
     check_numbers(root, sensor)
     scene_import.check_transforms(parsed, sensor)
     scene_import.check_files(parsed)
@@ -96,11 +101,14 @@ def load_scene(
         *integrators.integrator_warnings(found, lighting, native=False),
         *ignored(root, sensor),
     ]
-    scene, by_id = parsing.instantiate_scene(parsed)
+    with captured_warnings() as messages:
+        scene, by_id = parsing.instantiate_scene(parsed)
     chosen = list(root.children_of("sensor"))[sensor]
     eye = next(s for s in scene.sensors() if by_id.get(s.id()) is chosen)
     check_film(eye.film(), str(next(chosen.children_of("film"), chosen)))
+    check_emitters(scene, {id_: str(element) for id_, element in by_id.items()})
     names = [str(by_id.get(shape.id(), shape.id())) for shape in scene.shapes()]
+    warnings += messages
     return MitsubaScene(scene, eye, names, lighting, tuple(dict.fromkeys(warnings)))
 
 
@@ -125,6 +133,8 @@ def of_loaded(
     lighting = lighting or scene_import.lighting_of(scene, root)
     integrators.check_integrator(found, lighting, force_direct)
     features.refuse_refused(root, number)
+    check_instances(sum(s.class_name() == "Instance" for s in scene.shapes()))
+    check_emitters(scene, {})
     eye = sensors[number]
     size = tuple(int(n) for n in eye.film().size())
     if resolution is not None and resolution != size:
@@ -136,6 +146,44 @@ def of_loaded(
     warnings = integrators.integrator_warnings(found, lighting, native=False)
     names = [str(elements.from_object(shape)) for shape in scene.shapes()]
     return MitsubaScene(scene, eye, names, lighting, tuple(warnings))
+
+
+def check_instances(count: int) -> None:
+    """Raises UnsupportedFeature for more instances than Mitsuba can deal with."""
+    if count > LARGEST_INSTANCE_COUNT:
+        raise UnsupportedFeature(
+            f"the scene has {count} shapes of type 'instance', and Mitsuba's {VARIANT} "
+            f"compiles code for each of them: keep to {LARGEST_INSTANCE_COUNT}, or write "
+            "them out as meshes"
+        )
+
+
+def check_emitters(scene: Any, names: Mapping[str, str]) -> None:
+    """Raises SceneError for a light with NaN or infinite values, images included.
+
+    names: what messages call the emitters, by their ids.
+    """
+    for emitter in scene.emitters():
+        parts = objects.members(emitter)
+        for name, part in parts.items():
+            nested = objects.members(part) if isinstance(part, mi.Object) else {name: part}
+            for value in nested.values():
+                if not is_finite(value):
+                    element = names.get(emitter.id(), str(elements.from_object(emitter)))
+                    raise SceneError(
+                        f"{element} has NaN or infinite values in its {name}: repair them"
+                    )
+
+
+def is_finite(value: Any) -> bool:
+    """Whether all numbers of a parameter are finite, if it holds numbers."""
+    if isinstance(value, (bool, str, mi.Object)):
+        return True
+    try:
+        numbers = np.array(value, np.float64)
+    except (TypeError, ValueError, RuntimeError):
+        return True
+    return bool(np.isfinite(numbers).all())
 
 
 def check_film(film: Any, name: str) -> None:
@@ -163,6 +211,8 @@ def check_numbers(root: Element, sensor: int) -> None:
                 numbers = np.asarray(value, np.float64)
             except (TypeError, ValueError):
                 continue
+            if element.kind == "shape" and name == "radius" and not numbers.all():
+                raise SceneError(f"{element} has radius = 0: it must be larger")
             if np.isnan(numbers).any() or (
                 element.kind in ("emitter", "texture") and not np.isfinite(numbers).all()
             ):

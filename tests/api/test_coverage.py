@@ -1,4 +1,4 @@
-"""The table of what becomes of Mitsuba's plugins is complete, and is the one in the docs."""
+"""The table of what becomes of Mitsuba's plugins is complete, and the docs hold it."""
 
 from __future__ import annotations
 
