@@ -12,9 +12,12 @@ import importlib.util
 import os
 from types import ModuleType
 
-import drjit  # noqa: F401  (loads the thread pool library that the core is linked to)
+import mlrt_llvm
 
 from . import _cpu  # type: ignore[attr-defined]
+
+with mlrt_llvm.offered():
+    import drjit  # noqa: F401  (loads the thread pool library that the core is linked to)
 
 
 def available_isas() -> list[str]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from . import mitsuba_objects as objects
 
@@ -65,19 +68,41 @@ def kind_of(instance: Any) -> str:
     return "object"
 
 
+class Places:
+    """Where in the files of a scene its elements are, as Mitsuba counts lines and columns.
+
+    Mitsuba itself reads the file anew for each element, which takes hours for scenes with
+    many.
+    """
+
+    def __init__(self, files: list[Path]) -> None:
+        self._files = files
+        self._line_ends: dict[int, list[int]] = {}
+
+    def of(self, file: int, offset: int) -> str:
+        """File, line and column of a node of the parser; empty if it is in no file."""
+        if file >= len(self._files):
+            return ""
+        if file not in self._line_ends:
+            content = np.frombuffer(self._files[file].read_bytes(), np.uint8)
+            self._line_ends[file] = np.flatnonzero(content == ord("\n")).tolist()
+        ends = self._line_ends[file]
+        line = bisect.bisect_left(ends, offset)
+        start = ends[line - 1] + 1 if line else 0
+        return f"{self._files[file]} line {line + 1}:{offset - start + 1}"
+
+
 def from_state(state: Any) -> list[Element]:
     """The element of each node of a parsed scene; the first is the scene itself."""
     elements = []
+    places = Places([Path(str(file)) for file in state.files])
     for node in state.nodes:
-        location = mi.parser.file_location(state, node) if state.files else ""
         elements.append(
             Element(
                 kind=KINDS.get(node.type.name, node.type.name.lower()),
                 plugin=node.props.plugin_name(),
                 id=node.props.id(),
-                where=location.replace(" (line ", " line ")
-                .replace(", col ", ":")
-                .rstrip(")"),
+                where=places.of(node.file_index, node.offset),
             )
         )
     for node, element in zip(state.nodes, elements, strict=True):

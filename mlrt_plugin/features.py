@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from .elements import Element
 from .errors import UnsupportedFeature
-from .options import INTEGRATOR_OPTIONS
-from .scene_arrays import Feature, Lighting
+from .scene_arrays import Feature
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
 BSDFS = ("diffuse", "twosided")
@@ -17,20 +15,19 @@ SENSORS = ("perspective",)
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "gaussian")
 SAMPLERS = ("independent",)
-INTEGRATORS = ("direct", "path", "mlrt")
-CONSTANT_TEXTURES = ("uniform", "srgb", "d65", "regular", "irregular")
-NO_BSDF_SAMPLES = (
-    "BSDF samples are not taken, so area lights are noisier or less noisy than in Mitsuba; "
-    "the expected image is the same"
-)
-OWN_PARAMETERS = (
-    "hide_emitters",
-    "emitter_samples",
-    "bsdf_samples",
-    "shadow_offset",
-    *INTEGRATOR_OPTIONS,
-)
-"""Parameters of the integrator `mlrt`."""
+CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
+
+NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
+REFUSED = {
+    ("texture", "regular"): NOT_RGB,
+    ("texture", "irregular"): NOT_RGB,
+    ("texture", "blackbody"): NOT_RGB,
+    ("emitter", "timed_sunsky"): "Mitsuba 3.9.1 cannot sample it in its llvm variants",
+    ("sensor", "batch"): "render its sensors one by one, each declared in the scene",
+    ("sensor", "irradiancemeter"): "sensors that belong to shapes cannot be chosen",
+    ("film", "specfilm"): "it records spectra, and images are RGB: use hdrfilm",
+}
+"""Plugins that are rendered neither natively nor by Mitsuba, and why."""
 
 NATIVE = {
     "shape": SHAPES,
@@ -81,6 +78,15 @@ def reason_against(element: Element) -> str:
     return ""
 
 
+def refuse_refused(scene: Element, sensor: int) -> None:
+    """Raises UnsupportedFeature for what not even Mitsuba's plugins help with."""
+    chosen = list(scene.children_of("sensor"))[sensor]
+    for element in used_elements(scene, sensor):
+        reason = REFUSED.get((element.kind, element.plugin), "")
+        if reason and (element.kind != "sensor" or element is chosen):
+            raise UnsupportedFeature(f"{element} is not supported: {reason}")
+
+
 def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:
     """All elements that the image depends on, with the verdict on each."""
     found = [*used_elements(scene, sensor), *scene.children_of("integrator")]
@@ -122,74 +128,9 @@ def place(feature: Feature, file: str) -> str:
     return " ".join(filter(None, (f"'{feature.id}'" if feature.id else "", where)))
 
 
-def lighting_of(parameters: dict[str, Any], integrator: str) -> Lighting:
-    """Which part of an integrator's work is asked for; `parameters` are its properties."""
-    shading = int(parameters.get("shading_samples", 1))
-    return Lighting(
-        integrator=integrator,
-        emitter_samples=int(parameters.get("emitter_samples", shading)),
-        bsdf_samples=int(
-            parameters.get("bsdf_samples", 0 if integrator == "mlrt" else shading)
-        ),
-        hide_emitters=bool(parameters.get("hide_emitters", False)),
-        parameters=dict(parameters),
-    )
-
-
-def warnings_about(features: tuple[Feature, ...], lighting: Lighting) -> list[str]:
-    """What is approximated or ignored, a sentence each.
-
-    Raises UnsupportedFeature for an integrator that asks for an image without emitter
-    samples.
-    """
+def native_warnings(features: tuple[Feature, ...]) -> list[str]:
+    """What is done in another way natively, a sentence each."""
     warnings = []
-    glowing = any(f.kind == "emitter" and f.plugin == "area" for f in features)
-    integrator = lighting.integrator
-    name = next(
-        (str(f) for f in features if (f.kind, f.plugin) == ("integrator", integrator)),
-        f"integrator '{integrator}'",
-    )
-    if integrator == "direct":
-        if lighting.emitter_samples == 0:
-            raise UnsupportedFeature(
-                f"{name} has emitter_samples = 0, and light is found by emitter samples "
-                "only: set emitter_samples to 1"
-            )
-        if lighting.emitter_samples > 1:
-            warnings.append(
-                f"{name}: emitter_samples = {lighting.emitter_samples} is taken as 1; "
-                "raise the samples per pixel instead"
-            )
-        if lighting.bsdf_samples > 0 and glowing:
-            warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
-    elif integrator == "path":
-        depth = int(lighting.parameters.get("max_depth", -1))
-        if depth in (0, 1):
-            raise UnsupportedFeature(
-                f"{name} has max_depth = {depth}, which leaves out direct illumination, "
-                "and that is always rendered: set max_depth to 2"
-            )
-        if depth != 2:
-            warnings.append(
-                f"{name}: only direct illumination is rendered (max_depth = 2); "
-                f"the further bounces of max_depth = {depth} are missing"
-            )
-        elif glowing:
-            warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
-    elif integrator == "mlrt":
-        for parameter in lighting.parameters:
-            if parameter not in OWN_PARAMETERS:
-                raise UnsupportedFeature(
-                    f"{name} has no parameter '{parameter}': choose from "
-                    f"{', '.join(OWN_PARAMETERS)}"
-                )
-        if lighting.emitter_samples != 1 or lighting.bsdf_samples != 0:
-            raise UnsupportedFeature(
-                f"{name} takes one emitter sample and no BSDF sample: set "
-                "emitter_samples to 1 and bsdf_samples to 0, or leave them out"
-            )
-    else:
-        warnings.append(f"{name} is not supported: direct illumination is rendered instead")
     for feature in features:
         if feature.kind == "sampler" and feature.plugin not in SAMPLERS:
             warnings.append(f"{feature} is not supported: 'independent' is used instead")

@@ -1,61 +1,86 @@
-"""What a scene uses, and what of it is native, in words."""
+"""What a scene uses, who renders it, and why, in words."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
 
-from .errors import UnsupportedFeature
-from .features import INTEGRATORS, SAMPLERS, warnings_about
-from .scene_arrays import Feature
-from .scene_import import SceneSource, import_scene, summarise
+import mlrt_llvm
 
-TAKEN_OVER = {"integrator": INTEGRATORS, "sampler": SAMPLERS}
+from .errors import SceneError
+from .features import REFUSED, SAMPLERS, native_warnings
+from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
+from .scene_import import SceneSource, SceneSummary, import_scene, summarise
+from .shading_choice import choice_for
 
 
 def scene_report(
-    scene: SceneSource, *, sensor: int = 0, defines: Mapping[str, object] | None = None
+    scene: SceneSource,
+    *,
+    sensor: int = 0,
+    defines: Mapping[str, object] | None = None,
+    shading: str | None = None,
 ) -> list[str]:
     """Lines of text about a scene; its meshes are loaded only if it is native throughout.
 
     Raises SceneError if the scene cannot be read.
     """
     summary = summarise(scene, sensor=sensor, defines=defines)
+    choice = choice_for(summary, shading, summary.lighting)
+    native = choice.path == "native"
     lines = [f"sensors: {summary.sensor_count}", "uses:"]
     counts = Counter((f.kind, f.plugin, f.native) for f in summary.features)
-    for (kind, plugin, native), count in counts.items():
-        lines.append(f"  {count} x {kind} '{plugin}': {verdict(kind, plugin, native)}")
-    try:
-        warnings = warnings_about(summary.features, summary.lighting)
-    except UnsupportedFeature as error:
-        warnings, refusal = [], [str(error)]
-    else:
-        refusal = []
-    unsupported = [f for f in summary.features if not f.native]
-    refusal += [reason(feature) for feature in unsupported]
+    for (kind, plugin, is_native), count in counts.items():
+        verdict = verdict_on(kind, plugin, is_native, native)
+        lines.append(f"  {count} x {kind} '{plugin}': {verdict}")
+    other = [f for f in summary.features if not f.native]
+    if other:
+        lines.append("not supported:" if native else "not native:")
+        lines += [f"  {feature}: {feature.reason}" for feature in other]
+    refusal = refusal_of(summary)
     if refusal:
-        lines += ["not supported:", *(f"  {text}" for text in refusal)]
-        if warnings:
-            lines += ["approximated or ignored:", *(f"  {text}" for text in warnings)]
-        return lines
-    arrays = import_scene(scene, sensor=sensor, defines=defines)
-    film = arrays.film
-    lines += [
-        f"faces: {len(arrays.faces)}, vertices: {len(arrays.vertices)}, "
-        f"vertex normals: {'used' if len(arrays.normals) else 'not used'}",
-        f"materials: {len(arrays.materials)}, emitters: {len(arrays.emitters)}",
-        f"film: {film.width}x{film.height}, {film.filter} filter, {arrays.spp} spp",
-    ]
-    if arrays.warnings:
-        lines += ["approximated or ignored:", *(f"  {text}" for text in arrays.warnings)]
-    return [*lines, "the scene is rendered natively"]
+        lines.append(f"needs --force-direct: {refusal}")
+    warnings = integrator_warnings(summary.features, summary.lighting, native)
+    if native and not other and not refusal:
+        arrays = import_scene(scene, sensor=sensor, defines=defines)
+        film = arrays.film
+        lines += [
+            f"faces: {len(arrays.faces)}, vertices: {len(arrays.vertices)}, "
+            f"vertex normals: {'used' if len(arrays.normals) else 'not used'}",
+            f"materials: {len(arrays.materials)}, emitters: {len(arrays.emitters)}",
+            f"film: {film.width}x{film.height}, {film.filter} filter, {arrays.spp} spp",
+        ]
+        warnings = list(arrays.warnings)
+    elif native:
+        warnings += native_warnings(summary.features)
+    if warnings:
+        lines += ["approximated or ignored:", *(f"  {text}" for text in warnings)]
+    lines.append(f"shading: {choice}")
+    if not native:
+        try:
+            mlrt_llvm.activate()
+        except mlrt_llvm.LlvmUnavailable as error:
+            lines.append(f"cannot be rendered: {error}")
+    return lines
 
 
-def verdict(kind: str, plugin: str, native: bool) -> str:
-    if kind in TAKEN_OVER:
-        return "taken over" if plugin in TAKEN_OVER[kind] else "replaced"
-    return "native" if native else "not supported"
+def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) -> str:
+    """What becomes of a plugin."""
+    if kind == "integrator":
+        return "taken over" if plugin in TAKEN_OVER else "direct illumination only"
+    if not path_is_native:
+        if (kind, plugin) in REFUSED:
+            return "not supported"
+        return "hits native" if kind == "shape" and is_native else "by Mitsuba"
+    if kind == "sampler" and plugin not in SAMPLERS:
+        return "replaced"
+    return "native" if is_native else "not supported"
 
 
-def reason(feature: Feature) -> str:
-    return f"{feature}: {feature.reason}"
+def refusal_of(summary: SceneSummary) -> str:
+    """Why the scene's integrator is not taken over; empty if it is."""
+    try:
+        check_integrator(summary.features, summary.lighting, force_direct=False)
+    except SceneError as error:
+        return str(error)
+    return ""

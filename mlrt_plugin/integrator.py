@@ -1,9 +1,10 @@
 """The plugin ``<integrator type="mlrt">``.
 
 It is known to Mitsuba as soon as this package is imported, in the variant that is set and
-in all that are set later. Its parameters are `hide_emitters`, `shadow_offset`, and the
-options of building and tracing in `mlrt_plugin.options.INTEGRATOR_OPTIONS`; the latter
-change the time that is taken, never the image.
+in all that are set later. Its parameters are `hide_emitters`, `emitter_samples` and
+`bsdf_samples` as of `direct`, by default 1 and 0; `shading`; `shadow_offset`; and the
+options of building and tracing in `mlrt_plugin.options.INTEGRATOR_OPTIONS`, which change
+the time that is taken, never the image.
 """
 
 from __future__ import annotations
@@ -14,18 +15,17 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
-from .errors import UnsupportedFeature
 from .options import INTEGRATOR_OPTIONS
-from .render import PreparedScene, prepare
+from .render import Prepared, prepare
 from .scene_arrays import Lighting
+from .shading_choice import checked_shading
 
 mitsuba: Any = mi
 """For what Mitsuba's type stubs leave out."""
 
 PLUGIN = "mlrt"
 SAMPLE_COUNTS = {"emitter_samples": 1, "bsdf_samples": 0}
-"""Parameters of `direct` that the plugin also takes, with the only values that it
-supports."""
+"""Parameters of `direct` that the plugin also takes, with its defaults."""
 
 _registered: set[str] = set()
 
@@ -44,17 +44,22 @@ def integrator_class(module: Any) -> type:
                 super().__init__(props)
             finally:
                 mitsuba.set_log_level(level)
-            for name, supported in SAMPLE_COUNTS.items():
-                if props.get(name, supported) != supported:
-                    raise UnsupportedFeature(
-                        f"integrator '{PLUGIN}' supports {name} = {supported} only"
-                    )
+            self.sample_counts = {
+                name: int(props.get(name, count)) for name, count in SAMPLE_COUNTS.items()
+            }
+            if "shading" in props:
+                checked_shading(props["shading"])
             self.mlrt_parameters = {
                 name: props.get(name)
-                for name in ("shadow_offset", *INTEGRATOR_OPTIONS)
+                for name in (
+                    "shading",
+                    "shadow_offset",
+                    *SAMPLE_COUNTS,
+                    *INTEGRATOR_OPTIONS,
+                )
                 if name in props
             }
-            self.prepared: PreparedScene | None = None
+            self.prepared: Prepared | None = None
 
         def class_name(self) -> str:
             return "MlrtIntegrator"
@@ -71,13 +76,15 @@ def integrator_class(module: Any) -> type:
             develop: bool = True,
             evaluate: bool = True,
         ) -> Any:
-            """Renders natively. The tree is kept for the next image of the same meshes."""
+            """Renders natively, or by Mitsuba's plugins where the scene needs them.
+
+            The tree is kept for the next image of the same meshes."""
             self.prepared = prepare(
                 scene,
                 sensor=sensor,
                 lighting=Lighting(
                     PLUGIN,
-                    **SAMPLE_COUNTS,
+                    **self.sample_counts,
                     hide_emitters=self.hide_emitters,
                     parameters=self.mlrt_parameters,
                 ),

@@ -29,7 +29,10 @@ REMEDIES = (
     ("undefined parameter", "give it a value by -D or by a <default> in the scene"),
     ("unreferenced propert", "remove the property or mend its name"),
     ("unresolved reference", "mend the reference"),
-    ("file not found", "check the path of the file, which is relative to the scene"),
+    (
+        "file not found|No such file",
+        "check the path of the file, which is relative to the scene",
+    ),
     ("Could not map", "check that the file is not empty and can be read"),
     (
         "Storing new normals",
@@ -41,7 +44,8 @@ REMEDIES = (
     ("Plugin .* not found", "check the spelling of the plugin's type"),
     ("missing version", 'add version="3.0.0" to the <scene>'),
     ("Parsing of XML", "mend the XML there"),
-    (r"read \d+ out of", "the mesh file is truncated, export it anew"),
+    (r"read \d+ out of", "the file is truncated, export it anew"),
+    ("libpng|JPEG|OpenEXR", "the image is damaged, export it anew"),
     (
         "past the end of the stream|inflate|bytes required",
         "the mesh file is damaged, export it anew",
@@ -56,12 +60,15 @@ T = TypeVar("T")
 
 @dataclass
 class ParsedScene:
-    """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``."""
+    """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``.
+
+    resolver: where its files are looked for, those of its <path> elements included.
+    """
 
     config: Any
     state: Any
     elements: list[Element]
-    folder: Path
+    resolver: Any
     name: str
 
     @property
@@ -108,12 +115,26 @@ def reported(action: Callable[[], T], name: str, elements: Sequence[Element] = (
         raise SceneError(f"{message}; {remedy}") from error
 
 
+def resolver_from(*folders: Path) -> Any:
+    """A resolver that looks for files in these folders first, as Mitsuba's own loader looks
+    in that of the scene, and then where the process does."""
+    resolver = mitsuba.FileResolver(mitsuba.file_resolver())
+    for folder in reversed(folders):
+        resolver.prepend(str(folder))
+    return resolver
+
+
 @contextmanager
-def resolving_from(folder: Path) -> Iterator[None]:
-    """Lets Mitsuba look for files in a folder first, as its own loader does."""
+def resolving_from(*folders: Path) -> Iterator[None]:
+    """Lets Mitsuba look for files in these folders first."""
+    with resolving_by(resolver_from(*folders)):
+        yield
+
+
+@contextmanager
+def resolving_by(resolver: Any) -> Iterator[None]:
+    """Lets Mitsuba look for files as a resolver says."""
     before = mitsuba.file_resolver()
-    resolver = mitsuba.FileResolver(before)
-    resolver.prepend(str(folder))
     mitsuba.set_file_resolver(resolver)
     try:
         yield
@@ -141,8 +162,10 @@ def parser_config(variant: str) -> Any:
     return config
 
 
-def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
-    """Parses a scene file with values for its $parameters.
+def parse_file(
+    path: Path, defines: Mapping[str, object], variant: str = READING_VARIANT
+) -> ParsedScene:
+    """Parses a scene file with values for its $parameters, to be loaded in a variant.
 
     Raises SceneError if it does not exist or is malformed, if a parameter is not defined,
     or if one of `defines` is not used.
@@ -151,7 +174,7 @@ def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
         raise SceneError(f"scene '{path}' is a folder: name the XML file in it")
     if not path.exists():
         raise SceneError(f"scene file '{path}' does not exist: check its path")
-    config = parser_config(READING_VARIANT)
+    config = parser_config(variant)
     values = {key: str(value) for key, value in defines.items()}
 
     def parse() -> Any:
@@ -160,13 +183,15 @@ def parse_file(path: Path, defines: Mapping[str, object]) -> ParsedScene:
         mi.parser.transform_resolve(config, state)
         return state
 
-    with resolving_from(path.parent):
+    resolver = resolver_from(path.parent)
+    with resolving_by(resolver):
         state = reported(parse, str(path))
-    return ParsedScene(config, state, described(state), path.parent, str(path))
+    return ParsedScene(config, state, described(state), resolver, str(path))
 
 
-def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
-    """Parses a dictionary as ``mi.load_dict`` takes it.
+def parse_dict(scene: Mapping[str, Any], variant: str = READING_VARIANT) -> ParsedScene:
+    """Parses a dictionary as ``mi.load_dict`` takes it, to be loaded in the variant of the
+    objects that it holds, else in `variant`.
 
     Raises SceneError if it is malformed, or holds objects of an unusable variant.
     """
@@ -178,7 +203,7 @@ def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
             f"({', '.join(sorted(variants))}): "
             "load all of them in one"
         )
-    variant = variants.pop() if variants else READING_VARIANT
+    variant = variants.pop() if variants else variant
     if not variant.endswith("_rgb"):
         raise SceneError(
             f"the scene {name} holds objects of the variant {variant}: load them in an "
@@ -199,7 +224,7 @@ def parse_dict(scene: Mapping[str, Any]) -> ParsedScene:
             for child_name, element in elements[0].children:
                 if child_name == key:
                     element.plugin = "mlrt"
-    return ParsedScene(config, state, elements, Path(), name)
+    return ParsedScene(config, state, elements, resolver_from(Path()), name)
 
 
 def is_own_integrator(value: object) -> bool:
@@ -256,6 +281,23 @@ def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
     Integrators are not loaded: they are taken over, and may be unknown in the reading
     variant.
     """
+    by_id = numbered(parsed)
+    register_collector(parsed.config.variant)
+    root = parsed.state.nodes[0]
+    root.props.set_plugin_name(COLLECTOR)
+    root.type = mi.ObjectType.Texture
+    return loaded(parsed).parts, by_id
+
+
+def instantiate_scene(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
+    """Loads a parsed scene as a scene of Mitsuba, and tells which element each object came
+    from, by its id. Its integrator is a `direct` that stands in for the scene's own."""
+    by_id = numbered(parsed)
+    return loaded(parsed), by_id
+
+
+def numbered(parsed: ParsedScene) -> dict[str, Element]:
+    """Gives all nodes ids by which to find their elements, and takes integrators out."""
     by_id = {}
     for number, (node, element) in enumerate(
         zip(parsed.state.nodes, parsed.elements, strict=True)
@@ -264,14 +306,14 @@ def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
             node.props = mi.Properties("direct")
         node.props.set_id(f"n{number}")
         by_id[f"n{number}"] = element
-    register_collector(parsed.config.variant)
-    root = parsed.state.nodes[0]
-    root.props.set_plugin_name(COLLECTOR)
-    root.type = mi.ObjectType.Texture
-    with resolving_from(parsed.folder):
-        collector: Any = reported(
+    return by_id
+
+
+def loaded(parsed: ParsedScene) -> Any:
+    """The object that the root of a parsed scene describes; raises SceneError."""
+    with resolving_by(parsed.resolver):
+        return reported(
             lambda: mi.parser.instantiate(parsed.config, parsed.state),
             parsed.name,
             parsed.elements,
         )
-    return collector.parts, by_id

@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +15,7 @@ import numpy.typing as npt
 from ._dispatch import core
 from .emitters import check_distances
 from .errors import MlrtError, MlrtWarning
+from .integrators import own_aovs
 from .options import (
     AOVS,
     BUILD_OPTIONS,
@@ -25,10 +26,15 @@ from .options import (
 )
 from .scene_arrays import Lighting, SceneArrays
 from .scene_import import SceneSource, import_scene
+from .shading_choice import ShadingChoice, choose_shading
 from .threads import thread_count
 from .tree_cache import ObtainedTree, obtain_tree
 from .tree_report import invisible_meshes, tree_report
 
+if TYPE_CHECKING:
+    from .hybrid.prepared import PreparedHybrid
+
+Prepared: TypeAlias = "PreparedScene | PreparedHybrid"
 Progress = Callable[[float], object]
 """Called with the share of the work that is done, from 0 to 1."""
 
@@ -54,6 +60,9 @@ class RenderResult:
     warnings: tuple[str, ...] = ()
 
 
+NATIVE = ShadingChoice("native", "arrays of a scene are given")
+
+
 @dataclasses.dataclass(frozen=True)
 class PreparedScene:
     """A scene with its tree, ready to be rendered any number of times."""
@@ -64,6 +73,16 @@ class PreparedScene:
     build_options: dict[str, Any]
     timings: dict[str, float]
     tree_warnings: tuple[str, ...] = ()
+    shading: ShadingChoice = NATIVE
+
+    @property
+    def lighting(self) -> Lighting:
+        return self.arrays.lighting
+
+    @property
+    def spp(self) -> int:
+        """Samples per pixel of the scene's sampler."""
+        return self.arrays.spp
 
     @property
     def report(self) -> dict[str, Any]:
@@ -111,27 +130,31 @@ class PreparedScene:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
         samples = checked_spp(self.arrays.spp if spp is None else spp)
-        lighting = self.arrays.lighting
-        trace = {**lighting.own_options(TRACE_OPTIONS), **trace}
-        if shadow_offset is None:
-            own = lighting.own_options(("shadow_offset",))
-            shadow_offset = own.get("shadow_offset", SHADOW_OFFSETS[0])
-        check_shadow_offset(shadow_offset)
+        depth = self.lighting.integrator == "depth"
+        wanted = list(
+            dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(self.lighting))])
+        )
+        trace = {**self.lighting.own_options(TRACE_OPTIONS), **trace}
+        shadow_offset = chosen_shadow_offset(self.lighting, shadow_offset)
         start = time.perf_counter()
         result = core.render(
             self.handle,
             samples,
             checked_seed(seed, self.arrays.base_seed),
             trace,
-            list(aovs),
+            wanted,
             progress,
             shadow_offset,
         )
         if progress is not None:
             progress(1.0)
+        image, images = result["image"], dict(result["aovs"])
+        if depth:
+            image = as_depth(images["depth"])
+            images = {name: images[name] for name in aovs}
         return RenderResult(
-            image=result["image"],
-            aovs=dict(result["aovs"]),
+            image=image,
+            aovs=images,
             timings={**self.timings, "render": time.perf_counter() - start},
             counters=dict(result["counters"]),
             warnings=self.warnings,
@@ -146,10 +169,12 @@ def prepare(
     resolution: tuple[int, int] | None = None,
     hide_emitters: bool | None = None,
     lighting: Lighting | None = None,
-    previous: PreparedScene | None = None,
+    shading: str | None = None,
+    force_direct: bool = False,
+    previous: Prepared | None = None,
     tree_cache: str | os.PathLike[str] | None = None,
     **options: Any,
-) -> PreparedScene:
+) -> Prepared:
     """Reads a scene and builds its tree; `options` are of `BuildOptions`, and go before
     those that the scene gives its integrator `mlrt`. See `render`.
 
@@ -162,10 +187,35 @@ def prepare(
         raise TypeError(f"option '{next(iter(trace))}' is of render, not of prepare")
     start = time.perf_counter()
     if isinstance(scene, SceneArrays):
-        arrays = scene
+        arrays, choice = scene, NATIVE
     else:
+        choice = choose_shading(
+            scene, shading, sensor=sensor, defines=defines, lighting=lighting
+        )
+        if choice.path == "mitsuba":
+            # Not loaded where it is not used: Mitsuba's llvm variant takes a while.
+            from .hybrid.prepared import prepare_hybrid
+
+            return prepare_hybrid(
+                scene,
+                choice,
+                sensor=sensor,
+                defines=defines,
+                resolution=resolution,
+                hide_emitters=hide_emitters,
+                lighting=lighting,
+                force_direct=force_direct,
+                previous=previous,
+                tree_cache=tree_cache,
+                build=build,
+            )
         arrays = import_scene(
-            scene, sensor=sensor, defines=defines, resolution=resolution, lighting=lighting
+            scene,
+            sensor=sensor,
+            defines=defines,
+            resolution=resolution,
+            lighting=lighting,
+            force_direct=force_direct,
         )
     build = {**arrays.lighting.own_options(BUILD_OPTIONS), **build}
     loaded = time.perf_counter()
@@ -194,6 +244,7 @@ def prepare(
         build,
         {"load": loaded - start, **obtained.timings},
         obtained.warnings + invisible_meshes(obtained.tree, arrays),
+        choice,
     )
 
 
@@ -221,19 +272,27 @@ def render(
     "robust", by a bound of the error, for scenes of any size. None takes what the scene
     gives its integrator `mlrt`, else "mitsuba".
     defines: values of the file's $parameters.
-    params: resolution, a pair (width, height); hide_emitters; tree_cache, a folder that
+    params: resolution, a pair (width, height); hide_emitters; shading, one of auto, native
+    and mitsuba; force_direct, whether to render direct illumination where the scene's
+    integrator asks for more; tree_cache, a folder that
     trees are kept in from one process to the next; progress, called with the share of the
     work that is done; and the options of `mlrt_plugin.options`, which change
     the time that is taken but not the image.
 
     What is approximated or ignored is warned of as MlrtWarning. Raises SceneError if the
-    scene cannot be read, UnsupportedFeature if it uses what is not rendered natively,
+    scene cannot be read, UnsupportedFeature if it uses what is not rendered,
     MlrtError or ValueError for other arguments that make no sense, TypeError for an
     unknown one, and KeyboardInterrupt within 0.2 s.
     """
     of_scene = {
         name: params.pop(name)
-        for name in ("resolution", "hide_emitters", "tree_cache")
+        for name in (
+            "resolution",
+            "hide_emitters",
+            "shading",
+            "force_direct",
+            "tree_cache",
+        )
         if name in params
     }
     progress = params.pop("progress", None)
@@ -268,12 +327,27 @@ def checked_spp(spp: int) -> int:
     return spp
 
 
+def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """The image (H, W, 3) of integrator `depth`, of depths (H, W)."""
+    return np.repeat(depth[..., None], 3, axis=2)
+
+
 def checked_seed(seed: int, base_seed: int) -> int:
     """The seed of the random numbers, to which Mitsuba adds that of the sampler."""
     seed = integer(seed, "seed")
     if not 0 <= seed <= 0xFFFFFFFF:
         raise MlrtError(f"seed = {seed} is out of range: it must be from 0 to 2**32 - 1")
     return (seed + base_seed) & 0xFFFFFFFF
+
+
+def chosen_shadow_offset(lighting: Lighting, name: str | None) -> str:
+    """The name, or for None what the scene gives its integrator `mlrt`, else Mitsuba's.
+    Raises MlrtError for what is not in SHADOW_OFFSETS."""
+    if name is None:
+        own = lighting.own_options(("shadow_offset",))
+        name = own.get("shadow_offset", SHADOW_OFFSETS[0])
+    check_shadow_offset(name)
+    return str(name)
 
 
 def check_shadow_offset(name: object) -> None:

@@ -12,10 +12,10 @@ import mitsuba as mi
 import numpy as np
 
 from . import camera as cameras
-from . import elements, emitters, features, meshes, parsing
+from . import elements, emitters, features, integrators, meshes, parsing
 from . import mitsuba_objects as objects
 from .elements import Element
-from .errors import SceneError
+from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
@@ -68,6 +68,7 @@ def import_scene(
     defines: Mapping[str, object] | None = None,
     resolution: tuple[int, int] | None = None,
     lighting: Lighting | None = None,
+    force_direct: bool = False,
 ) -> SceneArrays:
     """Reads a scene.
 
@@ -78,6 +79,7 @@ def import_scene(
     field of view follows the film as the scene says, except that of a loaded scene, whose
     horizontal field of view is kept.
     lighting: what to render in place of what the scene's integrator asks for.
+    force_direct: whether to render direct illumination where the integrator asks for more.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
@@ -116,8 +118,13 @@ def import_scene(
     found = features.list_features(root, sensor)
     features.refuse_unsupported(found)
     if lighting is None:
-        lighting = loaded_lighting(scene) if is_loaded_scene(scene) else lighting_of(root)
-    warnings = features.warnings_about(found, lighting)
+        lighting = lighting_of(scene, root)
+    integrators.check_integrator(found, lighting, force_direct)
+    obstacle = integrators.native_obstacle(found, lighting)
+    if obstacle:
+        raise UnsupportedFeature(obstacle)
+    warnings = integrators.integrator_warnings(found, lighting, native=True)
+    warnings += features.native_warnings(found)
     if not is_loaded_scene(scene):
         check_transforms(parsed)
         check_files(parsed)
@@ -129,22 +136,29 @@ def import_scene(
 
 
 def summarise(
-    scene: SceneSource, *, sensor: int = 0, defines: Mapping[str, object] | None = None
+    scene: SceneSource, *, sensor: Any = 0, defines: Mapping[str, object] | None = None
 ) -> SceneSummary:
     """What a scene uses, natively or not, without loading it.
 
     Raises SceneError if it cannot be parsed.
     """
     if is_loaded_scene(scene):
-        root, lighting = elements.from_scene(scene, scene.sensors()), loaded_lighting(scene)
+        sensors, sensor = sensors_of(scene, sensor)
+        root = elements.from_scene(scene, sensors)
     else:
         root = parse(scene, defines).root
-        lighting = lighting_of(root)
     return SceneSummary(
         features.list_features(root, sensor),
-        lighting,
+        lighting_of(scene, root),
         len(list(root.children_of("sensor"))),
     )
+
+
+def lighting_of(scene: SceneSource, root: Element) -> Lighting:
+    """What the scene's integrator asks for."""
+    if is_loaded_scene(scene):
+        return integrators.loaded_lighting(scene)
+    return integrators.lighting_of(root)
 
 
 def is_loaded_scene(scene: SceneSource) -> bool:
@@ -168,13 +182,18 @@ def sensors_of(scene: Any, sensor: Any) -> tuple[list[Any], int]:
     return [*sensors, sensor], len(sensors)
 
 
-def parse(scene: SceneSource, defines: Mapping[str, object] | None) -> parsing.ParsedScene:
+def parse(
+    scene: SceneSource,
+    defines: Mapping[str, object] | None,
+    variant: str = parsing.READING_VARIANT,
+) -> parsing.ParsedScene:
+    """Parses a file or a dictionary, to be loaded in a variant."""
     if isinstance(scene, Mapping):
         if defines:
             raise SceneError("parameters cannot be defined for a scene dictionary")
-        parsed = parsing.parse_dict(scene)
+        parsed = parsing.parse_dict(scene, variant)
     elif isinstance(scene, (str, os.PathLike)):
-        parsed = parsing.parse_file(Path(scene), defines or {})
+        parsed = parsing.parse_file(Path(scene), defines or {}, variant)
     else:
         raise TypeError(
             "a scene is a path, a dictionary or a loaded mi.Scene, not "
@@ -209,9 +228,10 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
                 raise SceneError(f"{film} has {name} = {size}: it must be at least 1")
 
 
-def check_transforms(parsed: parsing.ParsedScene) -> None:
-    """Raises SceneError for a to_world that is not finite or flattens what it moves."""
-    for element in features.used_elements(parsed.root, -1):
+def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
+    """Raises SceneError for a to_world that is not finite or flattens what it moves, of
+    the shapes, the emitters and a sensor."""
+    for element in features.used_elements(parsed.root, sensor):
         transform = element.properties.get("to_world")
         if transform is None:
             continue
@@ -230,7 +250,7 @@ def check_transforms(parsed: parsing.ParsedScene) -> None:
 def check_files(parsed: parsing.ParsedScene) -> None:
     """Raises SceneError for mesh files whose indices would make Mitsuba crash."""
     checked = set()
-    with parsing.resolving_from(parsed.folder):
+    with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
             filename = element.properties.get("filename")
             if element.kind != "shape" or filename is None:
@@ -256,28 +276,6 @@ def set_resolution(
         number = next(n for n, e in enumerate(parsed.elements) if e is film)
         node = parsed.state.nodes[number]
         node.props["width"], node.props["height"] = resolution
-
-
-def lighting_of(root: Element) -> Lighting:
-    """What the integrator of a parsed scene asks for, by default `direct`."""
-    for integrator in root.children_of("integrator"):
-        return features.lighting_of(integrator.properties, integrator.plugin)
-    return Lighting()
-
-
-def loaded_lighting(scene: Any) -> Lighting:
-    """What the integrator of a loaded scene asks for."""
-    integrator = scene.integrator()
-    if integrator is None:
-        return Lighting()
-    parameters = dict(getattr(integrator, "mlrt_parameters", {}))
-    parameters["hide_emitters"] = bool(getattr(integrator, "hide_emitters", False))
-    for name in ("emitter_samples", "bsdf_samples", "max_depth"):
-        text = objects.described(integrator, name)
-        if text:
-            depth = int(text)
-            parameters[name] = -1 if depth == 0xFFFFFFFF else depth
-    return features.lighting_of(parameters, objects.plugin_name(integrator))
 
 
 def collect(

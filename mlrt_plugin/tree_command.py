@@ -83,7 +83,10 @@ def run_tree(arguments: argparse.Namespace) -> None:
     with thread_count(arguments.threads):
         start = time.perf_counter()
         arrays = import_scene(
-            arguments.scene, sensor=arguments.sensor, defines=dict(arguments.define)
+            arguments.scene,
+            sensor=arguments.sensor,
+            defines=dict(arguments.define),
+            force_direct=True,
         )
         loaded = time.perf_counter()
         with PeakMemory() as peak:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+# First, as Dr.Jit keeps the libLLVM that it finds when it is imported.
+import mlrt_plugin  # noqa: F401  # isort: skip
 import mitsuba as mi
 import pytest
 import repository

@@ -59,6 +59,7 @@ def compare_scene(arguments: Sequence[str]) -> int:
         sensor=options.sensor,
         resolution=options.resolution,
         threads=options.threads,
+        shading=options.shading,
         defines=dict(options.define),
     )
     check_output_folder(options.output)
@@ -73,6 +74,7 @@ def compare_scene(arguments: Sequence[str]) -> int:
     llvm.activate()
     try:
         from mlrt_plugin.errors import MlrtError
+        from mlrt_plugin.parsing import resolving_from
 
         from .outputs import write_outputs
         from .report import summary
@@ -85,7 +87,8 @@ def compare_scene(arguments: Sequence[str]) -> int:
 
     warnings.showwarning = show_warning
     try:
-        comparison = compare(settings, rounds=options.rounds)
+        with resolving_from(*options.append):
+            comparison = compare(settings, rounds=options.rounds)
         for warning in comparison.warnings:
             print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
         paths = write_outputs(comparison, options.output)
@@ -152,6 +155,20 @@ def scene_parser() -> argparse.ArgumentParser:
         type=at_least(1),
         metavar="THREADS",
         help="of both sides (all)",
+    )
+    parser.add_argument(
+        "-a",
+        dest="append",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="folder in which files of the scene are looked for as well; may be repeated",
+    )
+    parser.add_argument(
+        "--shading",
+        choices=("auto", "native", "mitsuba"),
+        help="who shades MLRT's image (the scene's option, else auto)",
     )
     parser.add_argument(
         "-o",

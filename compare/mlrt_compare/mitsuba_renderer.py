@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -37,14 +37,22 @@ class MitsubaRenderer:
 
     name = f"Mitsuba {mi.__version__} {VARIANT}"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        integrator: Mapping[str, Any] | None = None,
+        keep_sampler: bool = False,
+    ) -> None:
+        """integrator: what to render, by default `direct` with one emitter sample.
+        keep_sampler: whether to take the scene's sampler, by default `independent`."""
         mi.set_variant(VARIANT)
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings
+        self._keep_sampler = keep_sampler
         start = time.perf_counter()
         with _captured_log() as log:
             try:
-                self._load()
+                self._load(integrator)
             except RuntimeError as error:
                 raise SceneError(
                     f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
@@ -86,13 +94,13 @@ class MitsubaRenderer:
         """The last frame, (H, W, 3) of linear radiance."""
         return np.array(self._tensor, np.float32)
 
-    def _load(self) -> None:
+    def _load(self, integrator: Mapping[str, Any] | None) -> None:
         """As mi.load_file does, with sampler, film size and integrator replaced."""
         settings = self._settings
         config = mi.parser.ParserConfig(VARIANT)
         with resolving_from(settings.scene.parent):
             state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
-            hide_emitters = _align(state, settings)
+            hide_emitters = _align(state, settings, self._keep_sampler)
             # Merging moves meshes to the end, and lights with them; the order of the
             # emitters decides what a random number means, so it has to stay as declared.
             config.merge_meshes = not any(
@@ -101,14 +109,13 @@ class MitsubaRenderer:
             )
             mi.parser.transform_all(config, state)
             self._scene = mi.parser.instantiate(config, state)
-        self._integrator = mi.load_dict(
-            {
-                "type": "direct",
-                "emitter_samples": 1,
-                "bsdf_samples": 0,
-                "hide_emitters": hide_emitters,
-            }
-        )
+        default = {
+            "type": "direct",
+            "emitter_samples": 1,
+            "bsdf_samples": 0,
+            "hide_emitters": hide_emitters,
+        }
+        self._integrator = mi.load_dict(dict(integrator or default))
         self.spp = settings.spp or int(
             self._scene.sensors()[settings.sensor].sampler().sample_count()
         )
@@ -119,12 +126,12 @@ class MitsubaRenderer:
             self.kernels_compiled += not entry["cache_hit"]
 
 
-def _align(state: Any, settings: Settings) -> bool:
+def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
     """Gives every sensor the independent sampler and the wanted size; tells
     hide_emitters."""
     hide_emitters = False
     for node in state.nodes:
-        if node.type == mi.ObjectType.Sampler:
+        if node.type == mi.ObjectType.Sampler and not keep_sampler:
             sampler = mi.Properties("independent")
             sampler.set_id(node.props.id())
             for key in ("sample_count", "seed"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +29,44 @@ class MlrtRenderer:
             sensor=settings.sensor,
             defines=settings.defines,
             resolution=settings.resolution,
+            shading=settings.shading,
+            force_direct=True,
         )
         self.build = self._prepared.timings["build"]
         self.load = time.perf_counter() - start - self.build
-        self.warnings = self._prepared.arrays.warnings
-        self.spp = self._prepared.arrays.spp if settings.spp is None else settings.spp
+        self.warnings = self._prepared.warnings
+        self.spp = self._prepared.spp if settings.spp is None else settings.spp
         self._seed = settings.seed
         self._image: NDArray[np.float32] | None = None
+
+    @property
+    def shading(self) -> str:
+        """Who shades, and why."""
+        return str(self._prepared.shading)
+
+    @property
+    def by_mitsuba(self) -> bool:
+        """Whether Mitsuba's plugins shade, the scene's own sampler among them."""
+        return self._prepared.shading.path == "mitsuba"
+
+    @property
+    def integrator(self) -> dict[str, Any]:
+        """The integrator of Mitsuba that takes the same samples."""
+        lighting = self._prepared.lighting
+        if lighting.integrator == "depth":
+            return {"type": "depth"}
+        if lighting.emitter_samples == lighting.bsdf_samples == 0:
+            return {
+                "type": "path",
+                "max_depth": 1,
+                "hide_emitters": lighting.hide_emitters,
+            }
+        return {
+            "type": "direct",
+            "emitter_samples": lighting.emitter_samples if self.by_mitsuba else 1,
+            "bsdf_samples": lighting.bsdf_samples if self.by_mitsuba else 0,
+            "hide_emitters": lighting.hide_emitters,
+        }
 
     def frame(self) -> float:
         """Renders a frame and returns the seconds that it took."""

@@ -39,6 +39,8 @@ class Comparison:
 
     settings: Settings
     spp: int
+    shading: str
+    """Who shaded MLRT's image, and why."""
     threads: int
     llvm: str
     """Version of the libLLVM that compiled Mitsuba's kernels."""
@@ -59,6 +61,7 @@ class Comparison:
             "spp": self.spp,
             "seed": self.settings.seed,
             "sensor": self.settings.sensor,
+            "shading": self.shading,
             "threads": self.threads,
             "llvm": self.llvm,
             "timings": [
@@ -96,7 +99,7 @@ def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
             return result
 
         mlrt = step(lambda: MlrtRenderer(settings))
-        mitsuba = step(lambda: MitsubaRenderer(settings))
+        mitsuba = step(lambda: MitsubaRenderer(settings, mlrt.integrator, mlrt.by_mitsuba))
         first_mlrt, first_mitsuba = step(mlrt.frame), step(mitsuba.frame)
         frames_mlrt, frames_mitsuba = interleave(
             lambda: step(mlrt.frame), lambda: step(mitsuba.frame), rounds
@@ -114,6 +117,7 @@ def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
     return Comparison(
         settings=settings,
         spp=mlrt.spp,
+        shading=mlrt.shading,
         threads=threads,
         llvm=mitsuba.llvm,
         mlrt=Side(mlrt.name, mlrt.image, timings_mlrt),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Settings:
-    """One image of one scene: direct illumination, one emitter sample a shading point."""
+    """One image of one scene: direct illumination."""
 
     scene: Path
     spp: int | None = None
@@ -20,5 +20,7 @@ class Settings:
     """Width and height of the film in pixels; None: what the scene says."""
     threads: int | None = None
     """Worker threads of both renderers; None: all processors."""
+    shading: str | None = None
+    """MLRT's option of that name; None: what the scene says, else auto."""
     defines: Mapping[str, str] = field(default_factory=dict)
     """Values of the scene's $parameters."""

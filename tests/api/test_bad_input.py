@@ -304,5 +304,11 @@ def test_all_that_is_not_supported_is_named(scene_file: SceneFile) -> None:
 
 def test_integrator_is_named_with_its_place(scene_file: SceneFile) -> None:
     path = scene_file(integrator='<integrator type="path" id="way"/>')
-    (warning,) = import_scene(path).warnings
-    assert warning.startswith(f"integrator 'path' with id 'way' at {path} line 3:2: only")
+    name = f"integrator 'path' with id 'way' at {path} line 3:2"
+    (warning,) = import_scene(path, force_direct=True).warnings
+    assert warning.startswith(f"{name}: only direct illumination")
+    with pytest.raises(
+        UnsupportedFeature, match=r"max_depth = -1.*--force-direct"
+    ) as caught:
+        import_scene(path)
+    assert message_of(caught).startswith(f"{name} asks for more")

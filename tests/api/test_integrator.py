@@ -69,8 +69,11 @@ def test_parameters(scene_file: SceneFile, scalar_variant: None) -> None:
     assert np.array(mi.render(mi.load_file(str(path)))).max() == 0
     assert render(path).image.max() == 0
     assert render(path, hide_emitters=False).image.max() == 1
-    with pytest.raises(RuntimeError, match="bsdf_samples = 0 only"):
-        mi.load_dict({"type": "mlrt", "bsdf_samples": 1})
+    both = mi.load_dict({"type": "mlrt", "bsdf_samples": 1})
+    with pytest.raises(UnsupportedFeature, match=r"bsdf_samples to 0.*llvm_ad_rgb"):
+        mi.render(mi.load_file(str(path)), integrator=both)
+    with pytest.raises(RuntimeError, match="shading = 'toon' does not exist"):
+        mi.load_dict({"type": "mlrt", "shading": "toon"})
     with pytest.raises(RuntimeError, match="unreferenced"):
         mi.load_dict({"type": "mlrt", "bounces": 1})
     assert "packet" in str(mi.load_dict({"type": "mlrt", "traversal": "packet"}))

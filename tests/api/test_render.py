@@ -196,7 +196,9 @@ def test_arguments(scene_file: SceneFile) -> None:
         with pytest.raises(MlrtError, match="seed = "):
             render(path, seed=seed)
     with pytest.raises(UnsupportedFeature, match="sphere"):
-        render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'))
+        render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'), shading="native")
+    with pytest.raises(MlrtError, match="shading = 'fast' does not exist"):
+        render(path, shading="fast")
 
 
 @pytest.mark.parametrize(
@@ -239,7 +241,7 @@ def test_too_much_of_everything(
 def test_warnings(scene_file: SceneFile) -> None:
     path = scene_file(integrator='<integrator type="path"/>')
     with pytest.warns(MlrtWarning, match="max_depth = -1") as caught:
-        render(path)
+        render(path, force_direct=True)
     assert [w.filename for w in caught] == [__file__]
 
 

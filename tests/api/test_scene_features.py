@@ -23,7 +23,7 @@ MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
     ("parts", "named"),
     [
         ({"integrator": '<integrator type="path"/>'}, "max_depth = -1"),
-        ({"integrator": '<integrator type="depth"/>'}, "integrator 'depth'"),
+        ({"integrator": '<integrator type="volpath"/>'}, "participating media"),
         ({"sensor": MULTIJITTER}, "sampler 'multijitter'"),
         (
             {"integrator": '<integrator type="direct"/>', "emitters": GLOWING},
@@ -41,7 +41,7 @@ MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
 def test_approximations_are_named(
     scene_file: SceneFile, parts: dict[str, str], named: str
 ) -> None:
-    (warning,) = import_scene(scene_file(**parts)).warnings
+    (warning,) = import_scene(scene_file(**parts), force_direct=True).warnings
     assert named in warning
 
 

@@ -93,7 +93,7 @@ def test_unsupported_feature(
     scene_file: SceneFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = scene_file(shapes='<shape type="sphere" id="ball"/>')
-    line = failure(["render", str(path)], 1, capsys)
+    line = failure(["render", str(path), "--shading", "native"], 1, capsys)
     assert "shape 'sphere' with id 'ball'" in line
     assert str(path) in line
 

@@ -29,12 +29,22 @@ SHARED_SCENES = (
 )
 
 
-def assert_parity(scene: Path, folder: Path, defines: dict[str, str]) -> None:
+BY_MITSUBA = (
+    "living-room/scene.xml",
+    "mitsuba-data/tests/scenes/various_shapes/test_various_shapes_path.xml",
+    "mitsuba-tutorials/cbox.xml",
+)
+"""Scenes with plugins that are not native."""
+
+
+def assert_parity(
+    scene: Path, folder: Path, defines: dict[str, str], shading: str = "auto"
+) -> None:
     figures = folder / "figures.json"
     arguments = [
         str(scene),
         *("--spp", str(SPP), "--resolution", RESOLUTION, "--seed", "7", "--rounds", "1"),
-        *("-o", str(folder), "--json", str(figures)),
+        *("-o", str(folder), "--json", str(figures), "--shading", shading),
         *(f"-D{key}={value}" for key, value in defines.items()),
     ]
     child = subprocess.run(
@@ -45,7 +55,9 @@ def assert_parity(scene: Path, folder: Path, defines: dict[str, str]) -> None:
         timeout=300,
     )
     assert child.returncode == 0, child.stdout + child.stderr
-    assert json.loads(figures.read_text())["passed"]
+    result = json.loads(figures.read_text())
+    assert result["passed"]
+    assert shading == "auto" or result["shading"].startswith(shading)
 
 
 @pytest.mark.parametrize("name", OWN_SCENES)
@@ -59,3 +71,16 @@ def test_scene_beside_the_checkout(
     tmp_path: Path, shared_scene: Callable[[str], Path], name: str
 ) -> None:
     assert_parity(shared_scene(name), tmp_path, {})
+
+
+@pytest.mark.parametrize("name", OWN_SCENES)
+def test_scene_of_the_project_shaded_by_mitsuba(tmp_path: Path, name: str) -> None:
+    scene, defines = OWN_SCENES[name]
+    assert_parity(OWN / scene, tmp_path, defines, "mitsuba")
+
+
+@pytest.mark.parametrize("name", BY_MITSUBA)
+def test_scene_beside_the_checkout_shaded_by_mitsuba(
+    tmp_path: Path, shared_scene: Callable[[str], Path], name: str
+) -> None:
+    assert_parity(shared_scene(name), tmp_path, {}, "mitsuba")

@@ -165,7 +165,7 @@ def chosen_scenes(
 
 def imported(name: str, path: Path) -> BenchScene:
     try:
-        arrays = import_scene(path)
+        arrays = import_scene(path, force_direct=True)
     except MlrtError as error:
         raise BenchError(f"the scene {name} cannot be read: {error}") from error
     view = {**camera_fields(arrays.camera), "light": light_position(arrays, name)}

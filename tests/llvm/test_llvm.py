@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from mlrt_compare import llvm
+
+import mlrt_llvm as llvm
 
 COMPILER = shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")
 
@@ -130,7 +131,7 @@ def test_wheel_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_activation_reaches_drjit() -> None:
     program = """
-from mlrt_compare import llvm
+import mlrt_llvm as llvm
 chosen = llvm.activate()
 import drjit
 assert drjit.has_backend(drjit.JitBackend.LLVM)
@@ -141,10 +142,9 @@ assert drjit.detail.llvm_version() == chosen.version, drjit.detail.llvm_version(
 
 def test_too_late_is_said_when_drjit_has_no_usable_llvm(tmp_path: Path) -> None:
     program = """
-import os
-os.environ["DRJIT_LIBLLVM_PATH"] = "/nonexistent/libLLVM.so"
 import drjit
-from mlrt_compare import llvm
+import mlrt_llvm as llvm
+llvm.find = lambda: llvm.LibLlvm("libLLVM.so.20", (20, 1, 0))
 drjit.detail.llvm_version = lambda: (15, 0, 7)
 try:
     llvm.activate()

@@ -1,0 +1,130 @@
+"""What becomes of each plugin of Mitsuba, as a table: ``python -m mlrt_plugin.coverage``.
+
+The table is made from what the program itself decides by, so it cannot tell otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .elements import Element
+from .features import REFUSED, SAMPLERS, reason_against
+from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
+from .scene_arrays import Lighting
+
+MITSUBA = "3.9.1"
+PLUGINS = {
+    "shape": (
+        *("obj", "ply", "serialized", "cube", "rectangle", "merge", "blender"),
+        *("sphere", "disk", "cylinder", "bsplinecurve", "linearcurve", "sdfgrid"),
+        *("ellipsoids", "ellipsoidsmesh", "shapegroup", "instance"),
+    ),
+    "bsdf": (
+        *("diffuse", "twosided", "mask", "null", "blendbsdf", "bumpmap", "normalmap"),
+        *("plastic", "roughplastic", "conductor", "roughconductor", "dielectric"),
+        *("roughdielectric", "thindielectric", "principled", "principledthin", "hair"),
+        *("measured", "measured_polarized", "pplastic", "polarizer", "retarder"),
+        "circular",
+    ),
+    "emitter": (
+        *("point", "spot", "directional", "area", "constant", "envmap", "projector"),
+        *("directionalarea", "sunsky", "timed_sunsky"),
+    ),
+    "texture": (
+        *("bitmap", "checkerboard", "mesh_attribute", "volume", "uniform", "srgb", "d65"),
+        *("regular", "irregular", "blackbody", "rawconstant"),
+    ),
+    "volume": ("constvolume", "gridvolume"),
+    "medium": ("homogeneous", "heterogeneous"),
+    "phase function": ("hg", "isotropic", "rayleigh", "sggx", "tabphase", "blendphase"),
+    "sensor": (
+        *("perspective", "thinlens", "orthographic", "radiancemeter", "irradiancemeter"),
+        *("distant", "batch"),
+    ),
+    "film": ("hdrfilm", "specfilm"),
+    "rfilter": ("box", "gaussian", "tent", "mitchell", "catmullrom", "lanczos"),
+    "sampler": ("independent", "stratified", "multijitter", "orthogonal", "ldsampler"),
+    "integrator": (
+        *("direct", "path", "depth", "aov", "moment", "ptracer", "stokes", "volpath"),
+        *("volpathmis", "prb", "prb_basic", "prb_projective", "prbvolpath"),
+        *("direct_projective", "volprim_rf_basic"),
+    ),
+}
+"""All plugins of Mitsuba, by the kind of object that they make."""
+REMARKS = {
+    ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
+    ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
+    ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
+    ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
+    ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
+    ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
+    "`--force-direct`",
+    ("shape", "merge"): "shading; its meshes are in the tree",
+    ("shape", "blender"): "shading; its mesh is in the tree; not tested, as it takes "
+    "addresses in Blender's memory",
+    ("medium", "homogeneous"): "no effect, as in `direct`; a warning says so",
+    ("medium", "heterogeneous"): "no effect, as in `direct`; a warning says so",
+    ("bsdf", "measured"): "not tested, as its measurements are not free",
+    ("bsdf", "measured_polarized"): "not tested, as its measurements are not free",
+}
+"""What a verdict leaves open."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One plugin: `verdict` is native, by Mitsuba, refused, or taken over."""
+
+    kind: str
+    plugin: str
+    verdict: str
+    remark: str = ""
+
+
+def coverage_rows() -> list[Row]:
+    """All plugins of Mitsuba, and who renders them."""
+    return [row_of(kind, plugin) for kind, names in PLUGINS.items() for plugin in names]
+
+
+def row_of(kind: str, plugin: str) -> Row:
+    """What becomes of one plugin."""
+    remark = REMARKS.get((kind, plugin), "")
+    if (kind, plugin) in REFUSED:
+        return Row(kind, plugin, "refused", REFUSED[kind, plugin])
+    if kind == "integrator":
+        if plugin in TAKEN_OVER:
+            return Row(kind, plugin, "taken over", remark)
+        missing = what_is_missing(Lighting(plugin))
+        return Row(kind, plugin, "with --force-direct", f"without {missing}")
+    if kind == "sampler" and plugin not in SAMPLERS:
+        return Row(
+            kind, plugin, "by Mitsuba", "native scenes take `independent`, with a warning"
+        )
+    if not reason_against(Element(kind, plugin)):
+        return Row(kind, plugin, "native", remark)
+    if kind == "shape" and not remark:
+        remark = "hits and shading"
+    if kind == "phase function":
+        remark = REMARKS["medium", "homogeneous"]
+    return Row(kind, plugin, "by Mitsuba", remark)
+
+
+def coverage_table() -> str:
+    """The table in Markdown."""
+    lines = [
+        "# What is rendered",
+        "",
+        f"One row a plugin of Mitsuba {MITSUBA}; `python -m mlrt_plugin.coverage` prints "
+        "this page.",
+        "",
+        "| kind | plugin | rendered | |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| {row.kind} | `{row.plugin}` | {row.verdict} | {row.remark} |"
+        for row in coverage_rows()
+    ]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(coverage_table(), end="")

@@ -1,0 +1,224 @@
+"""A scene that Mitsuba shades, with its tree, ready to be rendered any number of times."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import drjit as dr
+import numpy as np
+
+from ..errors import MlrtError, MlrtWarning, SceneError, one_sentence
+from ..integrators import own_aovs
+from ..options import BUILD_OPTIONS, TRACE_OPTIONS
+from ..render import (
+    Progress,
+    RenderResult,
+    as_depth,
+    check_aovs,
+    checked_seed,
+    checked_spp,
+    chosen_shadow_offset,
+)
+from ..scene_arrays import Lighting
+from ..shading_choice import ShadingChoice
+from ..tree_cache import ObtainedTree, obtain_tree
+from ..tree_report import tree_report
+from .direct_light import DirectLight
+from .frame import render_frame
+from .hit_scene import HitScene, MeshFaces, mesh_faces, other_shapes
+from .loading import MitsubaScene, load_scene
+from .samplers import possible_spp
+
+
+@dataclass(frozen=True)
+class PreparedHybrid:
+    """The counterpart of `PreparedScene` for scenes that Mitsuba shades."""
+
+    loaded: MitsubaScene
+    faces: MeshFaces | None
+    tree: Any
+    others: Any
+    build_options: dict[str, Any]
+    timings: dict[str, float]
+    shading: ShadingChoice
+    hide_emitters: bool
+    tree_warnings: tuple[str, ...] = ()
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """How many shapes are in the tree and how many are left to Mitsuba, and what the
+        tree is like, see `tree_report`."""
+        shapes = {
+            "tree_shapes": self.faces.mesh_count if self.faces is not None else 0,
+            "mitsuba_shapes": len(self.others.shapes()) if self.others is not None else 0,
+        }
+        return {**shapes, **(tree_report(self.tree) if self.tree is not None else {})}
+
+    @property
+    def lighting(self) -> Lighting:
+        return self.loaded.lighting
+
+    @property
+    def spp(self) -> int:
+        """Samples per pixel of the scene's sampler."""
+        return int(self.loaded.sensor.sampler().sample_count())
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is approximated or ignored, a sentence each."""
+        geometry = tuple(self.faces.geometry.warnings) if self.faces is not None else ()
+        return self.loaded.warnings + geometry + self.tree_warnings
+
+    def tree_for(self, arrays: Any, build_options: dict[str, Any]) -> Any:
+        """The tree if it is that of other vertices and faces too, bit for bit, else
+        None."""
+        if self.faces is None or build_options != self.build_options:
+            return None
+        own = self.faces.geometry
+        same = np.array_equal(own.faces, arrays.faces) and np.array_equal(
+            own.vertices.view(np.uint32), arrays.vertices.view(np.uint32)
+        )
+        return self.tree if same else None
+
+    def warn(self, stacklevel: int = 1) -> None:
+        """Warns of what is approximated or ignored, as if the caller did."""
+        for message in self.warnings:
+            warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
+
+    def render(
+        self,
+        *,
+        spp: int | None = None,
+        seed: int = 0,
+        aovs: Sequence[str] = (),
+        shadow_offset: str | None = None,
+        progress: Progress | None = None,
+        **options: Any,
+    ) -> RenderResult:
+        """Renders the scene; `options` are fields of `TraceOptions`. See `render`."""
+        check_aovs(aovs)
+        if chosen_shadow_offset(self.lighting, shadow_offset) != "mitsuba":
+            raise MlrtError(
+                "shadow_offset = robust does not exist where Mitsuba shades, which makes "
+                "the shadow rays itself: leave it out, or choose shading = native"
+            )
+        if "cost" in aovs:
+            raise MlrtError(
+                "aov 'cost' does not exist where Mitsuba shades: leave it out, or choose "
+                "shading = native"
+            )
+        lighting, loaded, sensor = self.lighting, self.loaded, self.loaded.sensor
+        sampler = sensor.sampler()
+        asked = checked_spp(self.spp if spp is None else spp)
+        samples = possible_spp(sampler, asked)
+        trace = {**lighting.own_options(TRACE_OPTIONS), **options}
+        hits = HitScene(loaded.scene, self.tree, self.faces, self.others, trace)
+        depth = lighting.integrator == "depth"
+        light = DirectLight(
+            loaded.module,
+            loaded.scene,
+            hits,
+            emitter_samples=0 if depth else lighting.emitter_samples,
+            bsdf_samples=0 if depth else lighting.bsdf_samples,
+            hide_emitters=self.hide_emitters and not depth,
+        )
+        wanted = list(dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(lighting))]))
+        start = time.perf_counter()
+        try:
+            with dr.suspend_grad():  # type: ignore[no-untyped-call]
+                frame = render_frame(
+                    loaded.module,
+                    sensor,
+                    light,
+                    spp=samples,
+                    seed=checked_seed(seed, 0),
+                    aovs=wanted,
+                    progress=progress,
+                )
+                image, images = frame.image(), frame.aovs()
+        except RuntimeError as error:
+            first, _, _ = str(error).partition("\n")
+            raise SceneError(
+                f"Mitsuba's plugins cannot shade the scene: {one_sentence(first)}; find "
+                "the one at fault by taking materials, textures and lights out"
+            ) from error
+        if depth:
+            image = as_depth(images["depth"])
+            images = {name: images[name] for name in aovs}
+        messages = list(self.warnings)
+        if samples != asked:
+            messages.append(
+                f"sampler '{sampler.class_name()}' takes {samples} samples a pixel in "
+                f"place of {asked}"
+            )
+        broken = int(np.count_nonzero(~np.isfinite(image).all(axis=2)))
+        if broken:
+            messages.append(
+                f"{broken} pixels are not finite: look for textures, materials and lights "
+                "with NaN or infinite values"
+            )
+        return RenderResult(
+            image=image,
+            aovs=images,
+            timings={**self.timings, "render": time.perf_counter() - start},
+            counters={},
+            warnings=tuple(messages),
+        )
+
+
+def prepare_hybrid(
+    scene: Any,
+    choice: ShadingChoice,
+    *,
+    sensor: Any = 0,
+    defines: Mapping[str, object] | None = None,
+    resolution: tuple[int, int] | None = None,
+    hide_emitters: bool | None = None,
+    lighting: Lighting | None = None,
+    force_direct: bool = False,
+    previous: Any = None,
+    tree_cache: str | os.PathLike[str] | None = None,
+    build: dict[str, Any],
+) -> PreparedHybrid:
+    """Loads a scene in Mitsuba and builds a tree of its meshes; arguments as of `prepare`.
+
+    choice: that Mitsuba shades, and why. build: of `BuildOptions`.
+    """
+    start = time.perf_counter()
+    loaded = load_scene(
+        scene,
+        reason=choice.reason,
+        sensor=sensor,
+        defines=defines,
+        resolution=resolution,
+        lighting=lighting,
+        force_direct=force_direct,
+    )
+    faces = mesh_faces(loaded.scene, loaded.names)
+    others = other_shapes(loaded.scene)
+    build = {**loaded.lighting.own_options(BUILD_OPTIONS), **build}
+    after = time.perf_counter()
+    obtained = ObtainedTree(None)
+    if faces is not None:
+        tree = previous.tree_for(faces.geometry, build) if previous is not None else None
+        if tree is None:
+            geometry = faces.geometry
+            obtained = obtain_tree(geometry.vertices, geometry.faces, build, tree_cache)
+        else:
+            obtained = ObtainedTree(tree, {"build": time.perf_counter() - after})
+    return PreparedHybrid(
+        loaded,
+        faces,
+        obtained.tree,
+        others,
+        build,
+        {"load": after - start, "build": 0.0, **obtained.timings},
+        choice,
+        loaded.lighting.hide_emitters if hide_emitters is None else bool(hide_emitters),
+        obtained.warnings,
+    )

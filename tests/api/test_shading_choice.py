@@ -1,0 +1,143 @@
+"""Who shades a scene, and that the reason is told."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import plugin_scenes
+import pytest
+import scene_files
+
+from mlrt_plugin import MlrtError, SceneError, UnsupportedFeature, import_scene, prepare
+from mlrt_plugin.info import scene_report
+from mlrt_plugin.shading_choice import choose_shading
+
+SceneFile = Callable[..., Path]
+
+SHINY = '<shape type="cube"><bsdf type="plastic" id="shiny"/></shape>'
+NO_EMITTER_SAMPLES = (
+    '<integrator type="direct"><integer name="emitter_samples" value="0"/></integrator>'
+)
+
+
+def integrator(plugin: str, tag: str, name: str, value: object) -> str:
+    return (
+        f'<integrator type="{plugin}"><{tag} name="{name}" value="{value}"/></integrator>'
+    )
+
+
+def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
+    path = scene_file()
+    assert str(choose_shading(path)) == (
+        "native, because all plugins of the scene are native"
+    )
+    assert choose_shading(path, "mitsuba").path == "mitsuba"
+    prepared = prepare(path)
+    assert prepared.shading.path == "native" and prepared.spp == 2
+
+
+@pytest.mark.parametrize(
+    ("parts", "reason"),
+    [
+        ({"shapes": SHINY}, r"bsdf 'plastic' with id 'shiny' at .*:21 is not native"),
+        ({"shapes": '<shape type="sphere" id="ball"/>'}, "shape 'sphere' with id 'ball'"),
+        ({"integrator": NO_EMITTER_SAMPLES}, "integrator 'direct'.*no emitter samples"),
+        (
+            {"integrator": integrator("mlrt", "integer", "bsdf_samples", 2)},
+            "integrator 'mlrt'.*no BSDF sample natively",
+        ),
+        ({"shapes": SHINY + '<shape type="disk"/>'}, "'plastic'.*, and 1 more$"),
+    ],
+)
+def test_reasons_for_mitsuba_are_named(
+    scene_file: SceneFile, parts: dict[str, str], reason: str
+) -> None:
+    path = scene_file(**parts)
+    choice = choose_shading(path)
+    assert choice.path == "mitsuba"
+    assert re.search(reason, choice.reason), choice.reason
+    assert f"shading: {choice}" in scene_report(path)
+    with pytest.raises(UnsupportedFeature):
+        prepare(path, shading="native")
+
+
+def test_scene_may_choose(scene_file: SceneFile) -> None:
+    path = scene_file(integrator=integrator("mlrt", "string", "shading", "mitsuba"))
+    assert choose_shading(path).path == "mitsuba"
+    assert choose_shading(path, "native").path == "native"
+    path = scene_file(integrator=integrator("mlrt", "string", "shading", "toon"))
+    with pytest.raises(MlrtError, match="shading = 'toon' does not exist"):
+        choose_shading(path)
+
+
+AOV = (
+    '<integrator type="aov"><string name="aovs" value="{}"/>'
+    '<integrator type="{}"/></integrator>'
+)
+
+
+@pytest.mark.parametrize(
+    ("xml", "missing"),
+    [
+        (integrator("path", "integer", "max_depth", 3), "further bounces"),
+        ('<integrator type="volpath"/>', "participating media"),
+        ('<integrator type="moment"/>', "second moments"),
+        ('<integrator type="nothing"/>', "none of Mitsuba's own"),
+        (AOV.format("a:albedo", "direct"), "the AOV 'albedo'"),
+        (AOV.format("d:depth", "path"), "further bounces"),
+        (AOV.format("d:depth", "moment"), "'moment' in it"),
+    ],
+)
+def test_what_would_be_missing_must_be_allowed(
+    scene_file: SceneFile, xml: str, missing: str
+) -> None:
+    path = scene_file(integrator=xml)
+    with pytest.raises(UnsupportedFeature, match=f"{missing}.*--force-direct"):
+        import_scene(path)
+    assert any(text.startswith("needs --force-direct") for text in scene_report(path))
+    (warning,) = import_scene(path, force_direct=True).warnings
+    assert "is missing" in warning
+
+
+def test_paths_of_two_segments_are_direct_light(scene_file: SceneFile) -> None:
+    path = scene_file(integrator=integrator("path", "integer", "max_depth", 2))
+    assert import_scene(path).warnings == ()
+    for depth, error in ((0, "black"), (1, "no emitter samples")):
+        path = scene_file(integrator=integrator("path", "integer", "max_depth", depth))
+        with pytest.raises(SceneError, match=error):
+            import_scene(path)
+
+
+def test_aovs_of_the_scene_are_rendered(scene_file: SceneFile) -> None:
+    path = scene_file(integrator=AOV.format("z:depth, n:sh_normal", "direct"))
+    result = prepare(path).render()
+    plain = prepare(scene_file("plain.xml")).render(aovs=("depth", "normal"))
+    assert list(result.aovs) == ["depth", "normal"]
+    for name, image in result.aovs.items():
+        assert (image == plain.aovs[name]).all()
+    depth = prepare(scene_file(integrator='<integrator type="depth"/>')).render()
+    assert (depth.image == plain.aovs["depth"][..., None]).all()
+    assert depth.aovs == {} and depth.image.max() > 0
+
+
+def test_files_are_found_by_the_path_of_a_scene(tmp_path: Path) -> None:
+    (tmp_path / "common").mkdir()
+    (tmp_path / "common" / "square.ply").write_bytes(scene_files.ply_bytes())
+    (tmp_path / "scenes").mkdir()
+    path = tmp_path / "scenes" / "scene.xml"
+    mesh = scene_files.mesh_shape("square.ply")
+    path.write_text(scene_files.scene_xml(shapes=mesh, extra='<path value="../common"/>'))
+    assert len(import_scene(path).faces) == 2
+    path.write_text(scene_files.scene_xml(shapes=mesh))
+    with pytest.raises(SceneError, match="check the path"):
+        import_scene(path)
+
+
+def test_plugin_scenes_are_told_apart(tmp_path: Path) -> None:
+    for name in ("native", "plastics"):
+        path = tmp_path / f"{name}.xml"
+        path.write_text(plugin_scenes.SCENES[name])
+        expected = "native" if name == "native" else "mitsuba"
+        assert choose_shading(path).path == expected
