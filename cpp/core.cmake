@@ -37,8 +37,14 @@ endif()
 
 # A Python module of parts of the core, for one instruction set.
 function(mlrt_add_module module isa)
+    # Sanitizers tell where they find something by the symbols.
+    set(symbols "")
+    if(MLRT_SANITIZE)
+        set(symbols NOSTRIP)
+    endif()
     # NOMINSIZE: nanobind's default of -Os makes the kernels 8 to 15 times slower.
-    nanobind_add_module(${module} NOMINSIZE NB_STATIC NB_DOMAIN mlrt${module} ${ARGN})
+    nanobind_add_module(${module} NOMINSIZE ${symbols} NB_STATIC NB_DOMAIN mlrt${module}
+        ${ARGN})
     target_compile_definitions(${module} PRIVATE
         MLRT_MODULE=${module} MLRT_ISA_NAME="${isa}"
         $<$<BOOL:${MLRT_CHECKS}>:MLRT_CHECKS> $<$<NOT:$<CONFIG:Debug>>:NDEBUG>)

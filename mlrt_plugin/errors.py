@@ -32,9 +32,10 @@ class MlrtWarning(UserWarning):
 def one_sentence(message: str) -> str:
     """Mitsuba's report of an exception as a single line.
 
-    Drops what only its developers need (source locations, classes, terminal colours), and
-    says once what nested files repeat.
+    Drops what only its developers need (source locations, classes, terminal colours, what
+    objects hold), and says once what nested files repeat.
     """
+    message = without_contents(message)
     message = re.sub(r"\x1b\[[0-9;]*m", "", message)
     message = re.sub(r"\[[\w.]+\.(?:cpp|h):\d+\]\s*", "", message)
     message = re.sub(r"\[[A-Z]\w+\] ", "", message)
@@ -44,3 +45,17 @@ def one_sentence(message: str) -> str:
     message = " ".join(message.split())
     message = re.sub(r"(.{10,}?: )\1+", r"\1", message)
     return message.rstrip("!. ")
+
+
+def without_contents(message: str) -> str:
+    """Leaves the name of descriptions of objects, which go over lines as `Name[`, ...,
+    `]`."""
+    result = ""
+    while begin := re.search(r"\b[A-Z]\w*(?=\[\n)", message):
+        result += message[: begin.end()]
+        depth, position = 1, begin.end() + 1
+        while depth and position < len(message):
+            depth += {"[": 1, "]": -1}.get(message[position], 0)
+            position += 1
+        message = message[position:]
+    return result + message

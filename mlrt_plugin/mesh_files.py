@@ -1,6 +1,7 @@
 """Checks of mesh files that Mitsuba does not make: it trusts the indices in PLY and
-serialized files, and crashes on a face that refers to a vertex that does not exist; it
-takes OBJ files that are cut off; and it does not count vertices that are not finite.
+serialized files, and crashes on a face that refers to a vertex that does not exist, or on
+a serialized file that is damaged; it takes OBJ files that are cut off; and it does not
+count vertices that are not finite.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ UNREADABLE = (OSError, ValueError, LookupError, StopIteration, struct.error, zli
 
 
 def check_mesh_file(path: Path, plugin: str, shape_index: int = 0) -> None:
-    """Raises SceneError if a face of the file refers to a vertex that does not exist, or if
-    an OBJ file is cut off.
+    """Raises SceneError if a face of the file refers to a vertex that does not exist, if an
+    OBJ file is cut off, or if a serialized file is there but cannot be read.
 
     Any other defect is left for Mitsuba to report, which reads the file with all its
     contents.
@@ -39,7 +40,9 @@ def check_mesh_file(path: Path, plugin: str, shape_index: int = 0) -> None:
             else bad_index(path, plugin, shape_index)
         )
     except UNREADABLE:
-        return
+        if plugin != "serialized" or not path.is_file():
+            return
+        defect = "is damaged or no file of a serialized mesh: export it anew"
     if defect:
         raise SceneError(f"mesh file '{path}' {defect}")
 

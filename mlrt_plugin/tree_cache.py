@@ -42,12 +42,17 @@ def obtain_tree(
     cache: folder of the cache, which is made if need be; None builds. A file that cannot
     be used is replaced, and a cache that cannot be written does no harm, but there are
     warnings of both. A lazy tree is not kept, as it would have to be finished; a tree of
-    the fast builder that is there serves in its place.
+    the fast builder that is there serves in its place. Raises TreeFileError for an empty
+    name, which is no folder.
     """
     start = time.perf_counter()
     if cache is None:
         tree = core.KdTree(vertices, faces, **options)
         return ObtainedTree(tree, {"build": time.perf_counter() - start})
+    if not os.fspath(cache):
+        raise TreeFileError(
+            "the name of the folder of the tree cache is empty: '.' is the current folder"
+        )
     warnings = []
     loader = core.TreeLoader(vertices, faces)
     geometry = geometry_digest(loader.triangles)

@@ -54,8 +54,8 @@ struct Completion {
 };
 
 void run_one(uint32_t index, void *payload) {
-    const Part part(**static_cast<Job **>(payload));
-    Job &job = part.job;
+    Job &job = *static_cast<Job *>(payload);
+    const Part part(job);
     if (job.stop.load(std::memory_order_relaxed))
         return;
     KeepDenormals keep;
@@ -69,12 +69,10 @@ bool parallel_for(uint32_t count, const std::function<void(uint32_t)> &body,
     if (count == 0)
         return true;
     Job job{&body};
-    Job *payload = &job;
     tell_of_release(&job.begun);
     // Always through the queue: a job of one block would otherwise run inside the call, and
     // nobody could be asked whether to go on.
-    Task *task = task_submit_dep(nullptr, nullptr, 0, count, run_one, &payload,
-                                 sizeof(payload), nullptr, 1);
+    Task *task = task_submit_dep(nullptr, nullptr, 0, count, run_one, &job, 0, nullptr, 1);
     if (cancelled) {
         struct Watch {
             Task *task;

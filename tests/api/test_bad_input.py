@@ -54,6 +54,13 @@ SCENES = {
         {"shapes": '<shape type="cube"><float name="size" value="big"/></shape>'},
         "big",
     ),
+    "objects where none belong": (
+        {
+            "emitters": '<emitter type="point" id="x"><emitter type="directional"/>'
+            '<shape type="rectangle"><bsdf type="diffuse"/></shape></emitter>'
+        },
+        r'"point": - object "_arg_0": DirectionalEmitter - object "_arg_1": Rectangle;',
+    ),
     "bad reference": ({"shapes": '<shape type="cube"><ref id="nope"/></shape>'}, "nope"),
     "undefined parameter": ({"extra": '<bsdf type="$kind"/>'}, "kind"),
     "film without width": (film(0, 12), "width = 0"),
@@ -156,6 +163,10 @@ MESHES = {
         "vertex 88888888 of 4",
     ),
     "truncated.serialized": (scene_files.serialized_bytes()[:34], "truncated.serialized"),
+    "damaged.serialized": (
+        scene_files.serialized_bytes()[:13] + scene_files.serialized_bytes()[14:],
+        "damaged.serialized' is damaged or no file of a serialized mesh",
+    ),
     "index.obj": (scene_files.OBJ.replace("f 1 2 3", "f 1 2 7").encode(), "vertex 7"),
     "truncated.obj": (
         scene_files.OBJ[:-4].encode(),

@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 import scene_files
 
-from mlrt_plugin import MlrtWarning, prepare, render
+from mlrt_plugin import MlrtWarning, TreeFileError, prepare, render
 from mlrt_plugin._dispatch import core
 
 SceneFile = Callable[..., Path]
@@ -243,3 +243,8 @@ def test_a_tree_that_is_there_already_is_not_looked_for(
     first = prepare(scene)
     prepare(scene, previous=first, tree_cache=tmp_path / "cache")
     assert not (tmp_path / "cache").exists()
+
+
+def test_a_cache_without_a_name(scene: Path) -> None:
+    with pytest.raises(TreeFileError, match=r"name of the folder .* is empty"):
+        render(scene, tree_cache="")

@@ -109,7 +109,7 @@ def test_wrong_hits_are_counted() -> None:
     errors = wrong_hits.Errors()
     errors.add(exact, (t, face), np.ones(8, bool))
     assert errors == wrong_hits.Errors(
-        leaks=1,
+        misses=1,
         false_hits=1,
         wrong_faces=2,
         far_off=2,
@@ -120,7 +120,7 @@ def test_wrong_hits_are_counted() -> None:
     assert errors.wrong == 4
     few = wrong_hits.Errors()
     few.add(exact, (t, face), np.arange(8) == 1)
-    assert few == wrong_hits.Errors(leaks=1)
+    assert few == wrong_hits.Errors(misses=1)
 
 
 def test_watertight_command(native: Native, cache: Path, tmp_path: Path) -> None:
@@ -171,7 +171,7 @@ def test_hits_command(native: Native, cache: Path, tmp_path: Path) -> None:
     errors = figures["total"]["errors"]
     assert figures["total"]["rays"] == 36_000
     assert errors["MLRT"]["right"] > 5_000
-    assert errors["Embree default"]["leaks"] > 0
+    assert errors["Embree default"]["misses"] > 0
     assert "all, MLRT " in child.stdout
 
 

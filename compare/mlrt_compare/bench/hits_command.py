@@ -21,7 +21,7 @@ from .status import show_status
 from .table import aligned
 from .wrong_hits import study
 
-COLUMNS = ("leaks", "false_hits", "wrong_faces", "far_off", "wrong")
+COLUMNS = ("misses", "false_hits", "wrong_faces", "far_off", "wrong")
 
 
 def run(options: argparse.Namespace) -> bool:

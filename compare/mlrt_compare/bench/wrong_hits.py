@@ -24,7 +24,7 @@ FAR_OFF = 2.0**-20
 class Errors:
     """Of one contender: numbers of rays."""
 
-    leaks: int = 0
+    misses: int = 0
     """Nothing found, though something is hit."""
     false_hits: int = 0
     """Something found, though nothing is hit."""
@@ -41,7 +41,7 @@ class Errors:
 
     @property
     def wrong(self) -> int:
-        return self.leaks + self.false_hits + self.wrong_faces
+        return self.misses + self.false_hits + self.wrong_faces
 
     def as_json(self) -> dict[str, int]:
         return {**vars(self), "wrong": self.wrong}
@@ -55,7 +55,7 @@ class Errors:
         right = exact.includes(face)
         wrong_face = chosen & hit & claimed & ~right
         false_hit = chosen & ~hit & claimed
-        self.leaks += int(np.count_nonzero(chosen & hit & ~claimed))
+        self.misses += int(np.count_nonzero(chosen & hit & ~claimed))
         self.false_hits += int(np.count_nonzero(false_hit))
         self.wrong_faces += int(np.count_nonzero(wrong_face))
         with np.errstate(invalid="ignore"):
