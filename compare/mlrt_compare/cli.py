@@ -60,8 +60,15 @@ def compare_images(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def test_pixels(arguments: Sequence[str]) -> int:
+    from .ztest_command import run
+
+    return run(arguments)
+
+
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
+    "ztest": test_pixels,
 }
 """What the first argument may be instead of a scene; "scene" itself is the default."""

@@ -31,15 +31,26 @@ class MlrtRenderer:
         )
         self.build = self._prepared.timings["build"]
         self.load = time.perf_counter() - start - self.build
-        self.warnings = self._prepared.arrays.warnings
+        self.warnings = self._prepared.warnings
         self.spp = self._prepared.arrays.spp if settings.spp is None else settings.spp
         self._seed = settings.seed
         self._image: NDArray[np.float32] | None = None
 
-    def frame(self) -> float:
-        """Renders a frame and returns the seconds that it took."""
+    @property
+    def pixels(self) -> int:
+        """How many the image has."""
+        film = self._prepared.arrays.film
+        return film.crop_width * film.crop_height
+
+    def frame(self, *, spp: int | None = None, seed: int | None = None) -> float:
+        """Renders a frame and returns the seconds that it took.
+
+        spp, seed: in place of those of the settings.
+        """
         start = time.perf_counter()
-        self._image = self._prepared.render(spp=self.spp, seed=self._seed).image
+        self._image = self._prepared.render(
+            spp=spp or self.spp, seed=self._seed if seed is None else seed
+        ).image
         return time.perf_counter() - start
 
     @property

@@ -27,8 +27,13 @@ class Parser(argparse.ArgumentParser):
 
 
 def add_scene_options(parser: argparse.ArgumentParser) -> None:
-    """Those that choose what is rendered, with the letters of Mitsuba's own command."""
+    """The scene, and what of it is rendered."""
     parser.add_argument("scene", type=Path, metavar="SCENE", help="Mitsuba 3 XML file")
+    add_scene_choices(parser)
+
+
+def add_scene_choices(parser: argparse.ArgumentParser) -> None:
+    """What of a scene is rendered, with the letters of Mitsuba's own command."""
     parser.add_argument(
         "--resolution",
         type=resolution,

@@ -1,0 +1,87 @@
+"""Loads a scene in a variant of Mitsuba so that it renders what MLRT renders."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba
+
+from mlrt_plugin.errors import SceneError, one_sentence
+from mlrt_plugin.parsing import resolving_from
+
+from .settings import Settings
+
+# Mitsuba's type stubs do not know what depends on the variant.
+mi: Any = mitsuba
+
+
+@dataclass(frozen=True)
+class MitsubaScene:
+    """A loaded scene, and its integrator: `direct` with one emitter sample."""
+
+    scene: Any
+    integrator: Any
+    spp: int
+    """Those of the settings, else the scene's."""
+
+
+def load_mitsuba_scene(settings: Settings, variant: str) -> MitsubaScene:
+    """As mi.load_file does, with sampler, film size and integrator replaced; sets the
+    variant.
+
+    Raises SceneError, one sentence, if Mitsuba cannot load the scene.
+    """
+    mi.set_variant(variant)
+    try:
+        return _loaded(settings, variant)
+    except RuntimeError as error:
+        raise SceneError(
+            f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
+        ) from error
+
+
+def _loaded(settings: Settings, variant: str) -> MitsubaScene:
+    config = mi.parser.ParserConfig(variant)
+    with resolving_from(settings.scene.parent):
+        state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
+        hide_emitters = _align(state, settings)
+        # Merging moves meshes to the end, and lights with them; the order of the
+        # emitters decides what a random number means, so it has to stay as declared.
+        config.merge_meshes = not any(
+            node.type == mi.ObjectType.Emitter and node.props.plugin_name() == "area"
+            for node in state.nodes
+        )
+        mi.parser.transform_all(config, state)
+        scene = mi.parser.instantiate(config, state)
+    integrator = mi.load_dict(
+        {
+            "type": "direct",
+            "emitter_samples": 1,
+            "bsdf_samples": 0,
+            "hide_emitters": hide_emitters,
+        }
+    )
+    spp = settings.spp or int(scene.sensors()[settings.sensor].sampler().sample_count())
+    return MitsubaScene(scene, integrator, spp)
+
+
+def _align(state: Any, settings: Settings) -> bool:
+    """Gives every sensor the independent sampler and the wanted size; tells
+    hide_emitters."""
+    hide_emitters = False
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Sampler:
+            sampler = mi.Properties("independent")
+            sampler.set_id(node.props.id())
+            for key in ("sample_count", "seed"):
+                if key in node.props:
+                    sampler[key] = node.props[key]
+            node.props = sampler
+        elif node.type == mi.ObjectType.Film:
+            node.props["pixel_format"] = "rgb"
+            if settings.resolution is not None:
+                node.props["width"], node.props["height"] = settings.resolution
+        elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
+            hide_emitters = bool(node.props["hide_emitters"])
+    return hide_emitters
