@@ -66,9 +66,16 @@ def test_pixels(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def speed_and_error(arguments: Sequence[str]) -> int:
+    from .speed_error_command import run
+
+    return run(arguments)
+
+
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
     "ztest": test_pixels,
+    "speed-error": speed_and_error,
 }
 """What the first argument may be instead of a scene; "scene" itself is the default."""

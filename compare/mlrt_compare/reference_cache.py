@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import tempfile
 import zipfile
@@ -46,7 +47,8 @@ class ReferenceCache:
     def load(self, path: Path) -> Arrays | None:
         """What was stored there; None if nothing was, or if the file is damaged."""
         try:
-            with np.load(path, allow_pickle=False) as stored:
+            stream = io.BytesIO(path.read_bytes())
+            with np.load(stream, allow_pickle=False) as stored:
                 return {name: np.array(stored[name]) for name in stored.files}
         except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             return None
