@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from .reference_cache import ReferenceCache
 from .renderers import Renderer
+from .seeds import spread_seeds
 
 TILE = 16
 """Pixels along a side of the tiles whose means are kept of each batch; chosen so that a
@@ -42,17 +43,18 @@ def batch_reference(
     *,
     batches: int,
     spp: int,
-    first_seed: int,
+    seed: int,
     progress: Callable[[], object] = lambda: None,
 ) -> BatchReference:
     """Renders ``batches`` images of ``spp`` samples a pixel each, or takes the cache's.
 
-    key: what the images depend on besides. progress: called after each batch.
+    key: what the images depend on besides. seed: where the batches' seeds start.
+    progress: called after each batch.
     """
-    path = cache.path("batches", *key, batches, spp, first_seed, TILE)
+    path = cache.path("batches", *key, batches, spp, seed, TILE)
     arrays = cache.load(path)
     if arrays is None or set(arrays) != {"mean", "variance", "tiles"}:
-        arrays = _rendered(renderer, batches, spp, first_seed, progress)
+        arrays = _rendered(renderer, batches, spp, seed, progress)
         cache.store(path, arrays)
     return BatchReference(**arrays, spp=batches * spp)
 
@@ -61,12 +63,12 @@ def _rendered(
     renderer: Renderer,
     batches: int,
     spp: int,
-    first_seed: int,
+    seed: int,
     progress: Callable[[], object],
 ) -> dict[str, NDArray[np.float64]]:
     tiles = []
-    for number in range(batches):
-        renderer.frame(spp=spp, seed=first_seed + number)
+    for number, batch_seed in enumerate(spread_seeds(seed, batches)):
+        renderer.frame(spp=spp, seed=batch_seed)
         image = renderer.image.astype(np.float64)
         tiles.append(tile_means(image))
         # Welford's update: the sum of squares about the mean suffers no cancellation.

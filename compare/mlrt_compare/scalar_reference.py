@@ -16,6 +16,7 @@ from .exr_files import COLOUR, check_comparable, check_finite_reference, read_ex
 from .mitsuba_scene import load_mitsuba_scene
 from .reference_cache import ReferenceCache
 from .scene_hash import scene_hash
+from .seeds import spread_seeds
 from .settings import Settings
 
 mi: Any = mitsuba
@@ -23,8 +24,8 @@ mi: Any = mitsuba
 VARIANT = "scalar_rgb"
 PASSES = 16
 """Renders that a reference is the mean of: between them it can be interrupted; chosen."""
-FIRST_SEED = 2**31
-"""Far from the seeds of images that are tested."""
+SEEDS = 2**32 + 2
+"""Where their seeds start; nothing else starts there."""
 
 
 @dataclass(frozen=True)
@@ -104,14 +105,14 @@ def _rendered(
     nested = loaded.scene.integrator() if authored else loaded.integrator
     moment = mi.load_dict({"type": "moment", "nested": nested})
     images = []
-    for number in range(PASSES):
+    for number, seed in enumerate(spread_seeds(SEEDS, PASSES)):
         progress(number / PASSES)
         image = mi.render(
             loaded.scene,
             sensor=settings.sensor,
             integrator=moment,
             spp=spp,
-            seed=FIRST_SEED + number,
+            seed=seed,
         )
         images.append(np.array(image, np.float64))
     progress(1.0)

@@ -26,14 +26,16 @@ from .mlrt_renderer import MlrtRenderer
 from .reference_cache import ReferenceCache
 from .renderers import Renderer
 from .scene_hash import file_hash, scene_hash
+from .seeds import spread_seeds
 from .settings import Settings
 
 T = TypeVar("T")
 
 BATCHES = 64
 """Renders of a reference, each with other random numbers."""
-REFERENCE_SEEDS = (2**30, 2**31)
-"""First seeds of the references of both: independent of each other and of the runs."""
+REFERENCE_SEEDS = (2**32, 2**32 + 1)
+"""Where the seeds of both references start: beyond those that a user can choose for the
+runs."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class SpeedError:
     rel_mse: np.ndarray[Any, np.dtype[np.float64]]
     """(2, S, rounds) relative MSE against the reference by Mitsuba."""
     bias: BiasTest
+    kernels_from_disk: int
+    """Kernels of Mitsuba's first frame that an earlier process had compiled."""
     warnings: tuple[str, ...]
 
 
@@ -96,10 +100,9 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
             step()
             return result
 
-        renderers: tuple[Renderer, Renderer] = (
-            stepped(lambda: MlrtRenderer(settings)),
-            stepped(lambda: MitsubaRenderer(settings)),
-        )
+        mlrt = stepped(lambda: MlrtRenderer(settings))
+        mitsuba = stepped(lambda: MitsubaRenderer(settings))
+        renderers: tuple[Renderer, Renderer] = (mlrt, mitsuba)
         first = [
             tuple(stepped(partial(renderer.frame, spp=spp)) for spp in plan.spp)
             for renderer in renderers
@@ -123,6 +126,7 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
         runs=(Runs(plan.spp, seconds, mse[0]), Runs(plan.spp, seconds, mse[1])),
         rel_mse=rel_mse,
         bias=bias_test(references[0].tiles, references[1].tiles),
+        kernels_from_disk=mitsuba.kernels_from_disk,
         warnings=(*renderers[0].warnings, *renderers[1].warnings),
     )
 
@@ -149,7 +153,7 @@ def both_references(
             cache,
             batches=BATCHES,
             spp=spp,
-            first_seed=seed,
+            seed=seed,
             progress=progress,
         )
         for renderer, code, seed in zip(renderers, codes, REFERENCE_SEEDS, strict=True)
@@ -176,9 +180,10 @@ def rounds(
     by_mitsuba, by_mlrt = references[1], references[0]
     weights = 1 / (by_mitsuba.mean**2 + REL_MSE_EPSILON)
     noise_of_rel = float(np.mean(by_mitsuba.variance * weights))
+    seeds = iter(spread_seeds(settings.seed, plan.rounds * len(plan.spp)))
     for number in range(plan.rounds):
         for index, spp in enumerate(plan.spp):
-            seed = (settings.seed + 1 + number * len(plan.spp) + index) % REFERENCE_SEEDS[0]
+            seed = next(seeds)
             order = (0, 1) if (number + index) % 2 == 0 else (1, 0)
             for side in order:
                 at = (side, index, number)

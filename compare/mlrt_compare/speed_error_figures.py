@@ -46,6 +46,7 @@ def figures_of(measured: SpeedError, machine: dict[str, Any]) -> dict[str, Any]:
         },
         "bias": measured.bias.as_dict(),
         "break_even_frames": break_even(measured),
+        "kernels_from_disk": measured.kernels_from_disk,
         "warnings": list(measured.warnings),
     }
     figures["disturbed"] = disturbed(figures)

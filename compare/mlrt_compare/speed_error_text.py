@@ -78,6 +78,12 @@ def markdown(figures: dict[str, Any]) -> str:
             f"| {seconds(point['first'])} | {seconds(point['jit'])} "
             f"| {estimate(side['slope'], 3)} |"
         )
+    if figures["kernels_from_disk"]:
+        lines += [
+            "",
+            f"Mitsuba's first frame is short: {figures['kernels_from_disk']} kernels of "
+            "earlier runs came from Dr.Jit's cache.",
+        ]
     reference, bias = figures["reference"], figures["bias"]
     low, high = bias["relative_interval_99"]
     lines += [

@@ -9,6 +9,7 @@ import pytest
 from mlrt_compare.batch_reference import TILE, batch_reference, tile_means
 from mlrt_compare.bias import bias_test, welch
 from mlrt_compare.reference_cache import ReferenceCache
+from mlrt_compare.seeds import spread_seeds
 from scipy.stats import ttest_ind
 
 SEED = 20_260_812
@@ -75,6 +76,14 @@ def test_tile_means_by_hand() -> None:
     assert means == pytest.approx(np.array([[2 / TILE**2, 0], [0, 3]]))
 
 
+def test_seeds_are_spread_and_come_out_again() -> None:
+    first, second = spread_seeds(2**32, 64), spread_seeds(2**32 + 1, 64)
+    assert first == spread_seeds(2**32, 64) and first[:8] == spread_seeds(2**32, 8)
+    assert len({*first, *second}) == 128
+    assert all(0 <= seed < 2**32 for seed in first)
+    assert min(np.diff(sorted(first))) > 1000
+
+
 class Noisy:
     """A renderer whose images are noise about 1, of a variance of 1 a sample."""
 
@@ -93,7 +102,7 @@ class Noisy:
 
 def test_reference_tells_its_own_noise_and_is_kept(tmp_path: Path) -> None:
     renderer, cache = Noisy(), ReferenceCache(tmp_path)
-    options = {"batches": 16, "spp": 4, "first_seed": SEED}
+    options = {"batches": 16, "spp": 4, "seed": SEED}
     reference = batch_reference(renderer, ("key",), cache, **options)
     # 64 samples of variance 1; of 1440 estimates from 16 batches.
     assert reference.mse == pytest.approx(1 / 64, rel=0.05)
