@@ -53,6 +53,11 @@ class MlrtRenderer:
         ).image
         return time.perf_counter() - start
 
+    def cost(self) -> NDArray[np.float32]:
+        """(H, W) nodes that are visited and triangles that are tested for each pixel."""
+        result = self._prepared.render(spp=self.spp, seed=self._seed, aovs=("cost",))
+        return np.asarray(result.aovs["cost"], np.float32)
+
     @property
     def image(self) -> NDArray[np.float32]:
         """The last frame, (H, W, 3) of linear radiance."""
