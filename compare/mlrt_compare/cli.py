@@ -72,10 +72,17 @@ def speed_and_error(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def sweep_scenes(arguments: Sequence[str]) -> int:
+    from .sweep_command import run
+
+    return run(arguments)
+
+
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
     "ztest": test_pixels,
     "speed-error": speed_and_error,
+    "sweep": sweep_scenes,
 }
 """What the first argument may be instead of a scene; "scene" itself is the default."""

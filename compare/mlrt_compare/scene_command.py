@@ -83,7 +83,7 @@ def scene_parser() -> argparse.ArgumentParser:
         epilog="Exit codes: 0 the images agree, 2 they do not, 4 could not run. Other "
         "commands, each with its own --help: image, which compares EXR files; ztest, which "
         "tests renders as Mitsuba tests its own; speed-error, which measures error over "
-        "time.",
+        "time; sweep, which compares many scenes.",
     )
     add_scene_options(parser)
     parser.add_argument("--spp", type=at_least(1), help="samples a pixel (the scene's)")

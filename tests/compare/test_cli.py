@@ -78,7 +78,7 @@ def test_report_is_a_page_with_the_plot_of_the_folder(tmp_path: Path) -> None:
             {"name": name, "points": [{"spp": 1, "median": 2, "minimum": 1, "mse": 3}]}
             for name in ("MLRT", "Mitsuba")
         ],
-        **dict.fromkeys(("equal_time", "equal_error"), {"value": 2, "low": 1, "high": 3}),
+        **{key: {"value": 2, "low": 1, "high": 3} for key in ("equal_time", "equal_error")},
         "machine": {"time": "then"},
         "scene": "box",
         "passed": True,
