@@ -64,6 +64,8 @@ def run(arguments: Sequence[str]) -> int:
             from .report_page import report_page
 
             page = report_page(comparison, machine_of_comparison(), measured)
+        elif options.report:
+            show_warning("there is no report, as the images differ in size")
         paths = write_outputs(comparison, folder, page)
         figures = comparison.as_dict()
         write_json(options.json, figures)

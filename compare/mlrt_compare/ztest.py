@@ -100,8 +100,9 @@ def z_test(
     variance: of a single sample, in units of radiance squared; negative values count as 0.
     reference_spp: samples a pixel of the reference; infinite for one without noise, as
     Mitsuba has it. Values of the image that are not finite fail. Pixels must be
-    independent, as they are with a box filter; with a wider one the test of the mean is too
-    strict.
+    independent, as they are with a box filter; with a wider one they share samples and vary
+    less than their samples' variance says (by half with Mitsuba's Gaussian), so that both
+    tests are too lenient.
     """
     a, r = np.asarray(image, np.float64), np.asarray(reference, np.float64)
     v = np.maximum(np.asarray(variance, np.float64), 0.0)

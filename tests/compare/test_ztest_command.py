@@ -70,6 +70,35 @@ def test_stored_reference_of_mitsubas_tests_goes_before(
     assert told["reference_spp"] is None and not list((tmp_path / "cache").iterdir())
 
 
+def test_reference_by_the_authored_integrator(tmp_path: Path) -> None:
+    """BSDF samples, which MLRT does not take, change the noise but not the mean."""
+    scene = tmp_path / "scene.xml"
+    text = SCENE.read_text()
+    authored = '<integer name="bsdf_samples" value="0"/>'
+    assert authored in text
+    scene.write_text(text.replace(authored, authored.replace('"0"', '"1"')))
+    cache = tmp_path / "cache"
+    assert run(scene, *SMALL, "--cache", cache) == 0
+    (path,) = cache.iterdir()
+    with np.load(path) as arrays:
+        mean, variance = arrays["mean"], arrays["variance"]
+    assert run(scene, *SMALL, "--cache", cache, "--authored") in (0, 2)
+    (other,) = set(cache.iterdir()) - {path}
+    with np.load(other) as arrays:
+        assert arrays["mean"].mean() == pytest.approx(mean.mean(), rel=0.02)
+        assert not np.allclose(arrays["variance"], variance, rtol=0.05)
+
+
+def test_filters_that_share_samples_are_warned_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = (*SMALL, "--cache", tmp_path / "cache")
+    run(SCENE, *options)
+    assert "filter" not in capsys.readouterr().err
+    run(SCENE, *options, "-D", "rfilter=gaussian")
+    assert "the film's filter gaussian" in capsys.readouterr().err
+
+
 def test_files_are_tested_with_the_samples_told(tmp_path: Path) -> None:
     expected = exr_images.picture(SEED)
     files = [exr_images.write_exr(tmp_path / "image.exr", expected + 0.05)]
