@@ -22,6 +22,8 @@ BEYOND = 1.25
 """A curve is continued up to this factor beyond its ends, which noise may move."""
 
 Array = NDArray[np.float64]
+Factor = Callable[[Array, Array, int], float | None]
+"""Of (2, S) seconds and MSE and the number of an entry of S; None beyond the curves."""
 
 
 @dataclass(frozen=True)
@@ -96,13 +98,23 @@ class Runs:
         """The other renderer's seconds over those in which we reach its MSE."""
         return self.estimate(lambda seconds, mse: equal_time(mse, seconds, index))
 
-    def over_all(self, kind: Callable[[Array, Array, int], float | None]) -> Estimate:
+    def indices_with(self, kind: Factor) -> list[int]:
+        """At which numbers of samples the curves tell a factor."""
+        seconds, mse = np.median(self.seconds, axis=-1), np.mean(self.mse, axis=-1)
+        every = range(len(self.spp))
+        return [index for index in every if kind(seconds, mse, index) is not None]
+
+    def over_all(self, kind: Factor) -> Estimate:
         """Geometric mean of a factor over all numbers of samples that have it."""
+        indices = self.indices_with(kind)
 
         def mean(seconds: Array, mse: Array) -> float | None:
-            factors = [kind(seconds, mse, index) for index in range(len(self.spp))]
+            factors = [kind(seconds, mse, index) for index in indices]
             known = [factor for factor in factors if factor is not None]
-            return float(np.exp(np.mean(np.log(known)))) if known else None
+            # Means of other samples are not the same figure.
+            if not known or len(known) < len(indices):
+                return None
+            return float(np.exp(np.mean(np.log(known))))
 
         return self.estimate(mean)
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,13 +35,20 @@ class MitsubaRenderer:
 
     name = f"Mitsuba {mi.__version__} {VARIANT}"
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(
+        self,
+        settings: Settings,
+        integrator: Mapping[str, Any] | None = None,
+        keep_sampler: bool = False,
+    ) -> None:
+        """integrator: what to render, by default `direct` with one emitter sample.
+        keep_sampler: whether to take the scene's sampler, by default `independent`."""
         mi.set_variant(VARIANT)
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings
         start = time.perf_counter()
         with _captured_log() as log:
-            loaded = load_mitsuba_scene(settings, VARIANT)
+            loaded = load_mitsuba_scene(settings, VARIANT, integrator, keep_sampler)
             dr.sync_thread()
             text = log.read_log()
         seconds = time.perf_counter() - start

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ mi: Any = mitsuba
 
 @dataclass(frozen=True)
 class MitsubaScene:
-    """A loaded scene, and its integrator: `direct` with one emitter sample."""
+    """A loaded scene, and the integrator to render it with."""
 
     scene: Any
     integrator: Any
@@ -26,26 +27,38 @@ class MitsubaScene:
     """Those of the settings, else the scene's."""
 
 
-def load_mitsuba_scene(settings: Settings, variant: str) -> MitsubaScene:
+def load_mitsuba_scene(
+    settings: Settings,
+    variant: str,
+    integrator: Mapping[str, Any] | None = None,
+    keep_sampler: bool = False,
+) -> MitsubaScene:
     """As mi.load_file does, with sampler, film size and integrator replaced; sets the
     variant.
 
-    Raises SceneError, one sentence, if Mitsuba cannot load the scene.
+    integrator: what to render, by default `direct` with one emitter sample.
+    keep_sampler: whether to take the scene's sampler, by default `independent`. Raises
+    SceneError, one sentence, if Mitsuba cannot load the scene.
     """
     mi.set_variant(variant)
     try:
-        return _loaded(settings, variant)
+        return _loaded(settings, variant, integrator, keep_sampler)
     except RuntimeError as error:
         raise SceneError(
             f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
         ) from error
 
 
-def _loaded(settings: Settings, variant: str) -> MitsubaScene:
+def _loaded(
+    settings: Settings,
+    variant: str,
+    integrator: Mapping[str, Any] | None,
+    keep_sampler: bool,
+) -> MitsubaScene:
     config = mi.parser.ParserConfig(variant)
     with resolving_from(settings.scene.parent):
         state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
-        hide_emitters = _align(state, settings)
+        hide_emitters = _align(state, settings, keep_sampler)
         # Merging moves meshes to the end, and lights with them; the order of the
         # emitters decides what a random number means, so it has to stay as declared.
         config.merge_meshes = not any(
@@ -54,24 +67,22 @@ def _loaded(settings: Settings, variant: str) -> MitsubaScene:
         )
         mi.parser.transform_all(config, state)
         scene = mi.parser.instantiate(config, state)
-    integrator = mi.load_dict(
-        {
-            "type": "direct",
-            "emitter_samples": 1,
-            "bsdf_samples": 0,
-            "hide_emitters": hide_emitters,
-        }
-    )
+    default = {
+        "type": "direct",
+        "emitter_samples": 1,
+        "bsdf_samples": 0,
+        "hide_emitters": hide_emitters,
+    }
     spp = settings.spp or int(scene.sensors()[settings.sensor].sampler().sample_count())
-    return MitsubaScene(scene, integrator, spp)
+    return MitsubaScene(scene, mi.load_dict(dict(integrator or default)), spp)
 
 
-def _align(state: Any, settings: Settings) -> bool:
+def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
     """Gives every sensor the independent sampler and the wanted size; tells
     hide_emitters."""
     hide_emitters = False
     for node in state.nodes:
-        if node.type == mi.ObjectType.Sampler:
+        if node.type == mi.ObjectType.Sampler and not keep_sampler:
             sampler = mi.Properties("independent")
             sampler.set_id(node.props.id())
             for key in ("sample_count", "seed"):

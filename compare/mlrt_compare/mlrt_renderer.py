@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mlrt_plugin
+from mlrt_plugin.errors import MlrtError
 from mlrt_plugin.render import prepare
 
 from .settings import Settings
@@ -36,12 +37,6 @@ class MlrtRenderer:
         self._seed = settings.seed
         self._image: NDArray[np.float32] | None = None
 
-    @property
-    def pixels(self) -> int:
-        """How many the image has."""
-        film = self._prepared.arrays.film
-        return film.crop_width * film.crop_height
-
     def frame(self, *, spp: int | None = None, seed: int | None = None) -> float:
         """Renders a frame and returns the seconds that it took.
 
@@ -53,9 +48,13 @@ class MlrtRenderer:
         ).image
         return time.perf_counter() - start
 
-    def cost(self) -> NDArray[np.float32]:
-        """(H, W) nodes that are visited and triangles that are tested for each pixel."""
-        result = self._prepared.render(spp=self.spp, seed=self._seed, aovs=("cost",))
+    def cost(self) -> NDArray[np.float32] | None:
+        """(H, W) nodes that are visited and triangles that are tested for each pixel; None
+        where nobody counts them."""
+        try:
+            result = self._prepared.render(spp=self.spp, seed=self._seed, aovs=("cost",))
+        except MlrtError:
+            return None
         return np.asarray(result.aovs["cost"], np.float32)
 
     @property

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+from .settings import Settings
+
 PASSED, WARNED, FAILED, COULD_NOT_RUN, INTERRUPTED = 0, 1, 2, 4, 130
 """Exit codes; the first four are those of OpenImageIO's idiff."""
 PROGRAM = "mlrt-compare"
@@ -66,6 +68,19 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
         type=at_least(1),
         metavar="THREADS",
         help="of both sides (all)",
+    )
+
+
+def settings_of(options: argparse.Namespace, scene: Path, spp: int | None) -> Settings:
+    """What the options of `add_scene_choices` ask for."""
+    return Settings(
+        scene=scene,
+        spp=spp,
+        seed=options.seed,
+        sensor=options.sensor,
+        resolution=options.resolution,
+        threads=options.threads,
+        defines=dict(options.define),
     )
 
 

@@ -22,24 +22,16 @@ from .options import (
     at_least,
     check_json,
     check_output_folder,
+    settings_of,
     write_json,
 )
-from .settings import Settings
 from .timing import DEFAULT_ROUNDS
 
 
 def run(arguments: Sequence[str]) -> int:
     """Runs the command and returns its exit code. Raises CannotRun."""
     options = scene_parser().parse_args(arguments)
-    settings = Settings(
-        scene=options.scene,
-        spp=options.spp,
-        seed=options.seed,
-        sensor=options.sensor,
-        resolution=options.resolution,
-        threads=options.threads,
-        defines=dict(options.define),
-    )
+    settings = settings_of(options, options.scene, options.spp)
     folder: Path = options.output or Path()
     check_output_folder(folder)
     check_json(options.json)

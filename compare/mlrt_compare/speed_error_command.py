@@ -22,10 +22,10 @@ from .options import (
     at_least,
     check_json,
     check_output_folder,
+    settings_of,
     write_json,
 )
 from .scene_command import show_warning
-from .settings import Settings
 
 DEFAULT_SPP = (1, 2, 4, 8, 16, 32, 64)
 DEFAULT_ROUNDS = 16
@@ -36,14 +36,7 @@ REFERENCE_FACTOR = 64
 def run(arguments: Sequence[str]) -> int:
     """Runs the command and returns its exit code. Raises CannotRun."""
     options = speed_error_parser().parse_args(arguments)
-    settings = Settings(
-        scene=options.scene,
-        seed=options.seed,
-        sensor=options.sensor,
-        resolution=options.resolution,
-        threads=options.threads,
-        defines=dict(options.define),
-    )
+    settings = settings_of(options, options.scene, None)
     folder: Path = options.output or Path()
     check_output_folder(folder)
     check_json(options.json)

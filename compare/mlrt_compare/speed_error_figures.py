@@ -40,6 +40,8 @@ def figures_of(measured: SpeedError, machine: dict[str, Any]) -> dict[str, Any]:
         "samples": [sample_figures(runs, index) for index in range(len(runs.spp))],
         "equal_time": runs.over_all(equal_time).as_dict(),
         "equal_error": runs.over_all(equal_error).as_dict(),
+        "equal_time_spp": [runs.spp[i] for i in runs.indices_with(equal_time)],
+        "equal_error_spp": [runs.spp[i] for i in runs.indices_with(equal_error)],
         "against_own_reference": {
             "equal_time": measured.runs[1].over_all(equal_time).as_dict(),
             "equal_error": measured.runs[1].over_all(equal_error).as_dict(),

@@ -66,7 +66,8 @@ def markdown(figures: dict[str, Any]) -> str:
         "",
         f"Over all: at equal time {estimate(figures['equal_time'])} times less MSE, at "
         f"equal error {estimate(figures['equal_error'])} times less time (geometric means "
-        "where the curves overlap).",
+        f"over {len(figures['equal_time_spp'])} and {len(figures['equal_error_spp'])} of "
+        f"{len(figures['samples'])} numbers of samples, where the curves overlap).",
         "",
         "| | load | build | first frame | JIT | slope of MSE |",
         "|---|---|---|---|---|---|",

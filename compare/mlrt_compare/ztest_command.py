@@ -21,6 +21,7 @@ from .options import (
     at_least,
     check_json,
     check_output_folder,
+    settings_of,
     write_json,
 )
 from .settings import Settings
@@ -83,17 +84,8 @@ def test_scenes(options: argparse.Namespace) -> list[dict[str, Any]]:
 
     found = []
     for scene in options.inputs:
-        settings = Settings(
-            scene=scene,
-            spp=options.spp,
-            seed=options.seed,
-            sensor=options.sensor,
-            resolution=options.resolution,
-            threads=options.threads,
-            defines=dict(options.define),
-        )
         try:
-            found.append(test_scene(settings, options))
+            found.append(test_scene(settings_of(options, scene, options.spp), options))
         except (MlrtError, CannotRun) as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
             found.append({"name": str(scene), "code": COULD_NOT_RUN, "error": str(error)})
@@ -116,7 +108,11 @@ def test_scene(settings: Settings, options: argparse.Namespace) -> dict[str, Any
         renderer = MlrtRenderer(settings)
         for warning in (*renderer.warnings, *warnings_of_filter(settings)):
             print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
-        spp = settings.spp or max(1, SAMPLE_BUDGET // renderer.pixels)
+        spp = settings.spp
+        if spp is None:
+            renderer.frame(spp=1)
+            height, width = renderer.image.shape[:2]
+            spp = max(1, SAMPLE_BUDGET // (height * width))
         renderer.frame(spp=spp)
         image = renderer.image
         reference = None if settings.resolution else stored_reference(settings.scene)
