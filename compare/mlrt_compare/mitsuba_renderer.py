@@ -16,9 +16,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from mlrt_plugin.errors import SceneError, one_sentence
-from mlrt_plugin.parsing import resolving_from
-
+from .mitsuba_scene import load_mitsuba_scene
 from .settings import Settings
 
 # Mitsuba's type stubs do not know what depends on the variant.
@@ -51,12 +49,7 @@ class MitsubaRenderer:
         self._keep_sampler = keep_sampler
         start = time.perf_counter()
         with _captured_log() as log:
-            try:
-                self._load(integrator)
-            except RuntimeError as error:
-                raise SceneError(
-                    f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
-                ) from error
+            loaded = load_mitsuba_scene(settings, VARIANT, integrator, keep_sampler)
             dr.sync_thread()
             text = log.read_log()
         seconds = time.perf_counter() - start
@@ -64,22 +57,27 @@ class MitsubaRenderer:
         self.load = seconds - (self.build or 0.0)
         self.warnings = [line for line in text.splitlines() if " WARN " in line]
         self.kernels_compiled = self.kernels_from_disk = 0
+        self.spp = loaded.spp
+        self._loaded = loaded
         self._frames = 0
         self._tensor: Any = None
 
-    def frame(self) -> float:
-        """Renders a frame and returns the seconds that it took, kernels evaluated."""
+    def frame(self, *, spp: int | None = None, seed: int | None = None) -> float:
+        """Renders a frame and returns the seconds that it took, kernels evaluated.
+
+        spp, seed: in place of those of the settings.
+        """
         dr.sync_thread()
         # The history costs time of its own, so only the first frame, which compiles, has
         # it.
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, self._frames == 0):
             start = time.perf_counter()
             self._tensor = mi.render(
-                self._scene,
+                self._loaded.scene,
                 sensor=self._settings.sensor,
-                integrator=self._integrator,
-                seed=self._settings.seed,
-                spp=self.spp,
+                integrator=self._loaded.integrator,
+                seed=self._settings.seed if seed is None else seed,
+                spp=spp or self.spp,
             )
             dr.eval(self._tensor)
             dr.sync_thread()
@@ -94,57 +92,10 @@ class MitsubaRenderer:
         """The last frame, (H, W, 3) of linear radiance."""
         return np.array(self._tensor, np.float32)
 
-    def _load(self, integrator: Mapping[str, Any] | None) -> None:
-        """As mi.load_file does, with sampler, film size and integrator replaced."""
-        settings = self._settings
-        config = mi.parser.ParserConfig(VARIANT)
-        with resolving_from(settings.scene.parent):
-            state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
-            hide_emitters = _align(state, settings, self._keep_sampler)
-            # Merging moves meshes to the end, and lights with them; the order of the
-            # emitters decides what a random number means, so it has to stay as declared.
-            config.merge_meshes = not any(
-                node.type == mi.ObjectType.Emitter and node.props.plugin_name() == "area"
-                for node in state.nodes
-            )
-            mi.parser.transform_all(config, state)
-            self._scene = mi.parser.instantiate(config, state)
-        default = {
-            "type": "direct",
-            "emitter_samples": 1,
-            "bsdf_samples": 0,
-            "hide_emitters": hide_emitters,
-        }
-        self._integrator = mi.load_dict(dict(integrator or default))
-        self.spp = settings.spp or int(
-            self._scene.sensors()[settings.sensor].sampler().sample_count()
-        )
-
     def _count_kernels(self) -> None:
         for entry in dr.kernel_history([dr.KernelType.JIT]):
             self.kernels_from_disk += bool(entry["cache_disk"])
             self.kernels_compiled += not entry["cache_hit"]
-
-
-def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
-    """Gives every sensor the independent sampler and the wanted size; tells
-    hide_emitters."""
-    hide_emitters = False
-    for node in state.nodes:
-        if node.type == mi.ObjectType.Sampler and not keep_sampler:
-            sampler = mi.Properties("independent")
-            sampler.set_id(node.props.id())
-            for key in ("sample_count", "seed"):
-                if key in node.props:
-                    sampler[key] = node.props[key]
-            node.props = sampler
-        elif node.type == mi.ObjectType.Film:
-            node.props["pixel_format"] = "rgb"
-            if settings.resolution is not None:
-                node.props["width"], node.props["height"] = settings.resolution
-        elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
-            hide_emitters = bool(node.props["hide_emitters"])
-    return hide_emitters
 
 
 @contextmanager

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mlrt_plugin
+from mlrt_plugin.errors import MlrtError
+from mlrt_plugin.parsing import resolving_from
 from mlrt_plugin.render import prepare
 
 from .settings import Settings
@@ -24,14 +26,15 @@ class MlrtRenderer:
 
     def __init__(self, settings: Settings) -> None:
         start = time.perf_counter()
-        self._prepared = prepare(
-            settings.scene,
-            sensor=settings.sensor,
-            defines=settings.defines,
-            resolution=settings.resolution,
-            shading=settings.shading,
-            force_direct=True,
-        )
+        with resolving_from(*settings.folders):
+            self._prepared = prepare(
+                settings.scene,
+                sensor=settings.sensor,
+                defines=settings.defines,
+                resolution=settings.resolution,
+                shading=settings.shading,
+                force_direct=True,
+            )
         self.build = self._prepared.timings["build"]
         self.load = time.perf_counter() - start - self.build
         self.warnings = self._prepared.warnings
@@ -68,11 +71,25 @@ class MlrtRenderer:
             "hide_emitters": lighting.hide_emitters,
         }
 
-    def frame(self) -> float:
-        """Renders a frame and returns the seconds that it took."""
+    def frame(self, *, spp: int | None = None, seed: int | None = None) -> float:
+        """Renders a frame and returns the seconds that it took.
+
+        spp, seed: in place of those of the settings.
+        """
         start = time.perf_counter()
-        self._image = self._prepared.render(spp=self.spp, seed=self._seed).image
+        self._image = self._prepared.render(
+            spp=spp or self.spp, seed=self._seed if seed is None else seed
+        ).image
         return time.perf_counter() - start
+
+    def cost(self) -> NDArray[np.float32] | None:
+        """(H, W) nodes that are visited and triangles that are tested for each pixel; None
+        where nobody counts them."""
+        try:
+            result = self._prepared.render(spp=self.spp, seed=self._seed, aovs=("cost",))
+        except MlrtError:
+            return None
+        return np.asarray(result.aovs["cost"], np.float32)
 
     @property
     def image(self) -> NDArray[np.float32]:

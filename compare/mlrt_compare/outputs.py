@@ -13,8 +13,11 @@ from .report import side_by_side
 from .run import Comparison
 
 
-def write_outputs(comparison: Comparison, folder: Path) -> list[Path]:
-    """Writes STEM-mlrt.exr, STEM-mitsuba.exr and STEM-comparison.png; returns their paths.
+def write_outputs(
+    comparison: Comparison, folder: Path, page: str | None = None
+) -> list[Path]:
+    """Writes STEM-mlrt.exr, STEM-mitsuba.exr, STEM-comparison.png, and STEM-report.html if
+    there is a page; returns their paths.
 
     Makes ``folder`` if its parent exists. Raises OSError if something cannot be written;
     then no image is left behind.
@@ -35,4 +38,7 @@ def write_outputs(comparison: Comparison, folder: Path) -> list[Path]:
             Pillow.fromarray(picture).save(unfinished / names[2])
         else:
             names.pop()
+        if page is not None:
+            names.append(f"{stem}-report.html")
+            (unfinished / names[-1]).write_text(page, encoding="utf-8")
         return [(unfinished / name).replace(folder / name) for name in names]

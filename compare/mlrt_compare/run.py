@@ -48,6 +48,8 @@ class Comparison:
     mitsuba: Side
     verdict: Verdict
     warnings: tuple[str, ...]
+    cost: NDArray[np.float32] | None = None
+    """(H, W) MLRT's nodes and triangles for each pixel, if they were asked for."""
 
     def as_dict(self) -> dict[str, Any]:
         """Everything but the images, as JSON has it: a figure that is not finite is
@@ -80,12 +82,15 @@ class Comparison:
         }
 
 
-def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
+def compare(
+    settings: Settings, *, rounds: int = DEFAULT_ROUNDS, cost: bool = False
+) -> Comparison:
     """Renders the scene on both sides and holds MLRT's image against Mitsuba's.
 
     After one first frame each, both render 2 ``rounds`` frames for the timings, in the
     order A B B A. A terminal shows progress, drawn between the frames: loading a side and
-    each frame count as a step. Raises MlrtError if a side cannot load the scene.
+    each frame count as a step. ``cost`` asks for a further image of what
+    tracing takes. Raises MlrtError if a side cannot load the scene.
     """
     steps = 4 + FRAMES_OF_ROUND * rounds
     with thread_count(settings.threads), ProgressBar("comparing") as bar:
@@ -105,6 +110,7 @@ def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
             lambda: step(mlrt.frame), lambda: step(mitsuba.frame), rounds
         )
         threads = int(dr.thread_count())
+        cost_map = mlrt.cost() if cost else None
     timings_mlrt = Timings(mlrt.load, mlrt.build, first_mlrt, frames_mlrt)
     timings_mitsuba = Timings(
         mitsuba.load,
@@ -124,4 +130,5 @@ def compare(settings: Settings, *, rounds: int = DEFAULT_ROUNDS) -> Comparison:
         mitsuba=Side(mitsuba.name, mitsuba.image, timings_mitsuba),
         verdict=judge(mlrt.image, mitsuba.image),
         warnings=(*mlrt.warnings, *mitsuba.warnings),
+        cost=cost_map,
     )

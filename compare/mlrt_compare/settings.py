@@ -22,5 +22,7 @@ class Settings:
     """Worker threads of both renderers; None: all processors."""
     shading: str | None = None
     """MLRT's option of that name; None: what the scene says, else auto."""
+    folders: tuple[Path, ...] = ()
+    """Folders in which files of the scene are looked for as well."""
     defines: Mapping[str, str] = field(default_factory=dict)
     """Values of the scene's $parameters."""

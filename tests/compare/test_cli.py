@@ -72,6 +72,27 @@ def test_agreeing_images_pass_and_leave_their_files(tmp_path: Path) -> None:
     assert mlrt["jit"] is None and mitsuba["jit"] is not None
 
 
+def test_report_is_a_page_with_the_plot_of_the_folder(tmp_path: Path) -> None:
+    figures = {
+        "sides": [
+            {"name": name, "points": [{"spp": 1, "median": 2, "minimum": 1, "mse": 3}]}
+            for name in ("MLRT", "Mitsuba")
+        ],
+        **{key: {"value": 2, "low": 1, "high": 3} for key in ("equal_time", "equal_error")},
+        "machine": {"time": "then"},
+        "scene": "box",
+        "passed": True,
+        "reasons": [],
+        "disturbed": [],
+    }
+    (tmp_path / "cornell-box-speed-error.json").write_text(json.dumps(figures))
+    child = command(SCENE, *SMALL, "-o", tmp_path, "--report")
+    assert child.returncode == 0, child.stdout + child.stderr
+    page = (tmp_path / "cornell-box-report.html").read_text()
+    assert "cornell-box.xml: MLRT and Mitsuba" in page
+    assert "At equal time MLRT has 2.00 (1.00 to 3.00) times less MSE" in page
+
+
 def test_written_images_are_what_was_compared(tmp_path: Path) -> None:
     import mitsuba as mi
 
@@ -122,6 +143,9 @@ def test_wrong_image_fails(tmp_path: Path, how: str) -> None:
         ((SCENE, "-o", SCENE.parent / "no" / "such"), "no folder"),
         ((SCENE, "--json", SCENE.parent / "no" / "such.json"), "no folder"),
         ((SCENE, "--json", SCENE.parent), "is a folder"),
+        ((SCENE, "--report", "--speed-error", SCENE), "holds no figures"),
+        ((SCENE, "--report", "--speed-error", "none.json"), "none.json"),
+        ((SCENE, "--speed-error", "none.json"), "--report"),
     ],
 )
 def test_what_cannot_run_is_one_sentence(

@@ -14,7 +14,7 @@ from PIL import Image as Pillow
 
 from mlrt_plugin.image_files import replacing
 from mlrt_plugin.options import SHADOW_OFFSETS
-from mlrt_plugin.render import prepare
+from mlrt_plugin.render import PreparedScene, prepare
 
 from .checkout import find_checkout
 from .errors import BenchError
@@ -66,7 +66,10 @@ def measure(
     light: str, placement: Placement, resolution: int, subdivisions: int = 3
 ) -> tuple[dict[str, Judgement], list[Picture]]:
     """Judges an image with each offset, and draws what is wrong into it."""
-    prepared = prepare(hard_scene(light, placement, resolution, subdivisions))
+    prepared = prepare(
+        hard_scene(light, placement, resolution, subdivisions), shading="native"
+    )
+    assert isinstance(prepared, PreparedScene)
     results = {
         name: prepared.render(shadow_offset=name, aovs=("prim",)) for name in SHADOW_OFFSETS
     }

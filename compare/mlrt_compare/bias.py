@@ -1,0 +1,129 @@
+"""Tests whether two renderers have the same expected image.
+
+Welch's t-test on the means of tiles, as Jung, Hanika and Dachsbacher propose (Detecting
+Bias in Monte Carlo Renderers using Welch's t-test, JCGT 9(2), 2020): without bias the
+p-values of the tiles are uniformly distributed, and a small bias shows in their histogram
+before any pixel betrays it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import kstest
+from scipy.stats import t as student
+
+SIGNIFICANCE = 0.01
+BINS = 20
+ROUNDING = 1e-6
+"""Differences below this share of the image's mean are rounding; chosen as for verdicts."""
+
+
+@dataclass(frozen=True)
+class BiasTest:
+    """What the tiles and the whole image say of two sets of independent renders."""
+
+    tiles: int
+    """Tiles that have noise; others cannot be tested."""
+    differing_without_noise: int
+    """Tiles without noise whose means differ all the same."""
+    smallest_p: float
+    """Smallest p-value of a tile, corrected by Sidak for their number; 1 without tiles."""
+    uniform_p: float
+    """p-value of the Kolmogorov-Smirnov test that the tiles' are uniform."""
+    mean_p: float
+    """p-value of the means of the images."""
+    relative: float
+    """Mean of the first over that of the second, minus 1."""
+    interval: tuple[float, float]
+    """99 % confidence interval of it."""
+    histogram: tuple[int, ...]
+    """Numbers of tiles by p-value, from 0 to 1 in equal steps."""
+
+    @property
+    def passed(self) -> bool:
+        return not self.reasons()
+
+    def reasons(self) -> list[str]:
+        """What speaks for a bias, a phrase each; three tests share the significance."""
+        level = 1 - (1 - SIGNIFICANCE) ** (1 / 3)
+        found = []
+        if self.smallest_p < level:
+            found.append(f"a tile differs (p = {self.smallest_p:.2g} for all together)")
+        if self.differing_without_noise:
+            found.append(f"{self.differing_without_noise} tiles without noise differ")
+        if self.uniform_p < level:
+            found.append(f"the tiles' p-values are not uniform (p = {self.uniform_p:.2g})")
+        if self.mean_p < level:
+            found.append(
+                f"the means differ by {100 * self.relative:.3g} % (p = {self.mean_p:.2g})"
+            )
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        return {
+            "tiles": self.tiles,
+            "differing_without_noise": self.differing_without_noise,
+            "smallest_p": self.smallest_p,
+            "uniform_p": self.uniform_p,
+            "mean_p": self.mean_p,
+            "relative_difference": self.relative,
+            "relative_interval_99": list(self.interval),
+            "p_histogram": list(self.histogram),
+            "passed": self.passed,
+            "reasons": self.reasons(),
+        }
+
+
+def bias_test(first: NDArray[np.float64], second: NDArray[np.float64]) -> BiasTest:
+    """Tests two arrays (batches, TH, TW) of tile means, all of independent renders; at
+    least two of each."""
+    p, noisy, differing = welch(first, second)
+    means = [np.mean(tiles, axis=(1, 2)) for tiles in (first, second)]
+    overall = float(np.mean(means[1]))
+    difference = float(np.mean(means[0])) - overall
+    variance = sum(float(np.var(mean, ddof=1)) / len(mean) for mean in means)
+    degrees = len(means[0]) + len(means[1]) - 2
+    deviation = variance**0.5
+    half = float(student.ppf(0.995, degrees)) * deviation
+    scale = overall or 1.0
+    mean_p = 1.0
+    if abs(difference) > ROUNDING * abs(overall):
+        mean_p = (
+            float(2 * student.sf(abs(difference) / deviation, degrees))
+            if deviation
+            else 0.0
+        )
+    tested = p[noisy]
+    smallest = float(np.min(tested, initial=1.0))
+    return BiasTest(
+        tiles=int(np.count_nonzero(noisy)),
+        differing_without_noise=int(np.count_nonzero(differing)),
+        smallest_p=float(1 - (1 - smallest) ** max(len(tested), 1)),
+        uniform_p=float(kstest(tested, "uniform").pvalue) if len(tested) else 1.0,
+        mean_p=mean_p,
+        relative=difference / scale,
+        interval=((difference - half) / scale, (difference + half) / scale),
+        histogram=tuple(map(int, np.histogram(tested, BINS, (0, 1))[0])),
+    )
+
+
+def welch(
+    first: NDArray[np.float64], second: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Two-sided p-values (TH, TW) of the tiles, which tiles have noise, and which of the
+    others differ."""
+    shares = [np.var(tiles, axis=0, ddof=1) / len(tiles) for tiles in (first, second)]
+    difference = np.abs(np.mean(first, axis=0) - np.mean(second, axis=0))
+    variance = shares[0] + shares[1]
+    rounding = ROUNDING * abs(float(np.mean(second)))
+    noisy = variance > rounding**2
+    safe = np.where(noisy, variance, 1.0)
+    # Degrees of freedom by Welch and Satterthwaite.
+    parts = shares[0] ** 2 / (len(first) - 1) + shares[1] ** 2 / (len(second) - 1)
+    degrees = np.where(noisy, safe**2 / np.where(noisy, parts, 1.0), 1.0)
+    p = 2 * student.sf(difference / np.sqrt(safe), degrees)
+    return np.asarray(p), noisy, ~noisy & (difference > rounding)

@@ -1,0 +1,98 @@
+"""Loads a scene in a variant of Mitsuba so that it renders what MLRT renders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import mitsuba
+
+from mlrt_plugin.errors import SceneError, one_sentence
+from mlrt_plugin.parsing import resolving_from
+
+from .settings import Settings
+
+# Mitsuba's type stubs do not know what depends on the variant.
+mi: Any = mitsuba
+
+
+@dataclass(frozen=True)
+class MitsubaScene:
+    """A loaded scene, and the integrator to render it with."""
+
+    scene: Any
+    integrator: Any
+    spp: int
+    """Those of the settings, else the scene's."""
+
+
+def load_mitsuba_scene(
+    settings: Settings,
+    variant: str,
+    integrator: Mapping[str, Any] | None = None,
+    keep_sampler: bool = False,
+) -> MitsubaScene:
+    """As mi.load_file does, with sampler, film size and integrator replaced; sets the
+    variant.
+
+    integrator: what to render, by default `direct` with one emitter sample.
+    keep_sampler: whether to take the scene's sampler, by default `independent`. Raises
+    SceneError, one sentence, if Mitsuba cannot load the scene.
+    """
+    mi.set_variant(variant)
+    try:
+        return _loaded(settings, variant, integrator, keep_sampler)
+    except RuntimeError as error:
+        raise SceneError(
+            f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
+        ) from error
+
+
+def _loaded(
+    settings: Settings,
+    variant: str,
+    integrator: Mapping[str, Any] | None,
+    keep_sampler: bool,
+) -> MitsubaScene:
+    config = mi.parser.ParserConfig(variant)
+    with resolving_from(settings.scene.parent, *settings.folders):
+        state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
+        hide_emitters = _align(state, settings, keep_sampler)
+        # Merging moves meshes to the end, and lights with them; the order of the
+        # emitters decides what a random number means, so it has to stay as declared.
+        config.merge_meshes = not any(
+            node.type == mi.ObjectType.Emitter and node.props.plugin_name() == "area"
+            for node in state.nodes
+        )
+        mi.parser.transform_all(config, state)
+        scene = mi.parser.instantiate(config, state)
+    default = {
+        "type": "direct",
+        "emitter_samples": 1,
+        "bsdf_samples": 0,
+        "hide_emitters": hide_emitters,
+    }
+    spp = settings.spp or int(scene.sensors()[settings.sensor].sampler().sample_count())
+    return MitsubaScene(scene, mi.load_dict(dict(integrator or default)), spp)
+
+
+def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
+    """Gives every sensor the independent sampler and the wanted size; tells
+    hide_emitters."""
+    hide_emitters = False
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Sampler and not keep_sampler:
+            sampler = mi.Properties("independent")
+            sampler.set_id(node.props.id())
+            for key in ("sample_count", "seed"):
+                if key in node.props:
+                    sampler[key] = node.props[key]
+            node.props = sampler
+        elif node.type == mi.ObjectType.Film:
+            node.props["pixel_format"] = "rgb"
+            if settings.resolution is not None:
+                node.props["width"], node.props["height"] = settings.resolution
+        elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
+            hide_emitters = bool(node.props["hide_emitters"])
+    return hide_emitters

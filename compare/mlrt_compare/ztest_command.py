@@ -1,0 +1,237 @@
+"""mlrt-compare ztest: the test that Mitsuba judges its own renders by."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from .options import (
+    COULD_NOT_RUN,
+    FAILED,
+    PASSED,
+    PROGRAM,
+    CannotRun,
+    Parser,
+    add_output_options,
+    add_scene_choices,
+    at_least,
+    check_json,
+    check_output_folder,
+    settings_of,
+    write_json,
+)
+from .settings import Settings
+
+SAMPLE_BUDGET = 2_000_000
+"""Samples of an image that is tested, as in Mitsuba's own tests."""
+REFERENCE_FACTOR = 64
+"""Samples of a reference over those of the image: its noise then adds less than 1 % to the
+standard score."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Runs the command and returns its exit code, the worst of all scenes. Raises
+    CannotRun."""
+    options = ztest_parser().parse_args(arguments)
+    if options.output is not None:
+        check_output_folder(options.output)
+    check_json(options.json)
+    images = [path for path in options.inputs if path.suffix.lower() == ".exr"]
+    if not images:
+        tested = test_scenes(options)
+    elif len(images) == len(options.inputs) == 3:
+        tested = [test_images(options)]
+    else:
+        raise CannotRun(
+            "name scenes, or three EXR files: the image, the reference and the variance of "
+            "a sample"
+        )
+    if options.output is not None:
+        write_p_maps(tested, options.output)
+    for figures in tested:
+        figures.pop("test", None)
+    write_json(options.json, tested)
+    return max(int(figures["code"]) for figures in tested)
+
+
+def test_images(options: argparse.Namespace) -> dict[str, Any]:
+    """Tests an EXR file. Raises CannotRun."""
+    if options.spp is None:
+        raise CannotRun("tell how many samples a pixel the image has: --spp N")
+    from .exr_files import COLOUR, check_comparable, common_channels, read_exr
+    from .scalar_reference import reference_of_files, to_xyz
+    from .ztest import z_test
+
+    image, expected = read_exr(options.inputs[0]), read_exr(options.inputs[1])
+    check_comparable(image, expected)
+    for one in (image, expected):
+        common_channels(one, one, COLOUR)
+    reference = reference_of_files(*options.inputs[1:])
+    test = z_test(
+        to_xyz(image.stack(COLOUR)), reference.mean, reference.variance, options.spp
+    )
+    return told(str(options.inputs[0]), test, reference)
+
+
+def test_scenes(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Renders and tests each scene; one that cannot be rendered does not stop the
+    others."""
+    from mlrt_plugin.errors import MlrtError
+
+    found = []
+    for scene in options.inputs:
+        try:
+            found.append(test_scene(settings_of(options, scene, options.spp), options))
+        except (MlrtError, CannotRun) as error:
+            print(f"{PROGRAM}: {error}", file=sys.stderr)
+            found.append({"name": str(scene), "code": COULD_NOT_RUN, "error": str(error)})
+    return found
+
+
+def test_scene(settings: Settings, options: argparse.Namespace) -> dict[str, Any]:
+    """Renders a scene by MLRT and holds it against a reference that is stored, kept or
+    rendered. Raises MlrtError or CannotRun."""
+    from mlrt_plugin.progress import ProgressBar
+    from mlrt_plugin.threads import thread_count
+
+    from .mlrt_renderer import MlrtRenderer
+    from .reference_cache import ReferenceCache
+    from .scalar_reference import rendered_reference, stored_reference, to_xyz
+    from .ztest import z_test
+
+    cache = ReferenceCache(options.cache)
+    with thread_count(settings.threads):
+        renderer = MlrtRenderer(settings)
+        for warning in (*renderer.warnings, *warnings_of_filter(settings)):
+            print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
+        spp = settings.spp
+        if spp is None:
+            renderer.frame(spp=1)
+            height, width = renderer.image.shape[:2]
+            spp = max(1, SAMPLE_BUDGET // (height * width))
+        renderer.frame(spp=spp)
+        image = renderer.image
+        reference = None if settings.resolution else stored_reference(settings.scene)
+        if reference is None:
+            with ProgressBar(f"reference of {settings.scene.name}") as bar:
+                reference = rendered_reference(
+                    settings,
+                    options.reference_spp or REFERENCE_FACTOR * spp,
+                    cache,
+                    integrator=renderer.integrator,
+                    authored=options.authored,
+                    progress=bar,
+                )
+    if reference.mean.shape != image.shape:
+        raise CannotRun(
+            f"the reference of {settings.scene} has the shape {reference.mean.shape} and "
+            f"the image {image.shape}"
+        )
+    test = z_test(to_xyz(image), reference.mean, reference.variance, spp)
+    return told(str(settings.scene), test, reference)
+
+
+def warnings_of_filter(settings: Settings) -> list[str]:
+    """What to say of a film whose pixels share samples."""
+    from mlrt_plugin.parsing import parse_file
+
+    root = parse_file(settings.scene, settings.defines).root
+    sensors = list(root.children_of("sensor"))
+    films = sensors[settings.sensor].children_of("film") if sensors else ()
+    filters = [child.plugin for film in films for child in film.children_of("rfilter")]
+    plugin = filters[0] if filters else "gaussian"
+    if plugin == "box":
+        return []
+    return [
+        f"{settings.scene}: pixels share samples by the film's filter {plugin}, so that "
+        "the test is too lenient; a box filter makes it right"
+    ]
+
+
+def told(name: str, test: Any, reference: Any) -> dict[str, Any]:
+    """Prints what a test says, and returns it with the test itself."""
+    code = PASSED if test.pixels_pass else FAILED
+    known = "" if reference.spp == float("inf") else f", {reference.spp:.0f} spp"
+    print(
+        f"{'PASS' if code == PASSED else 'FAIL'} {name}: {100 * test.passing:.4f} % of the "
+        f"pixels' channels pass, smallest p {test.smallest_p:.2g} at alpha "
+        f"{test.alpha:.2g}, of the mean {test.mean_p:.2g}; "
+        f"{test.spp} spp against {reference.source}{known}"
+    )
+    return {
+        "name": name,
+        "code": code,
+        "reference": reference.source,
+        "reference_spp": reference.spp,
+        **test.as_dict(),
+        "test": test,
+    }
+
+
+def write_p_maps(tested: Sequence[dict[str, Any]], folder: Path) -> None:
+    """Writes STEM-p.png for each image that was tested; all or none."""
+    from PIL import Image as Pillow
+
+    from .image_maps import p_map
+
+    folder.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder, prefix=".mlrt-compare-") as temporary:
+        names = []
+        for figures in tested:
+            if "test" in figures:
+                test = figures["test"]
+                names.append(f"{Path(figures['name']).stem}-p.png")
+                picture = Pillow.fromarray(p_map(test.p_values, test.alpha))
+                picture.save(Path(temporary) / names[-1])
+        for name in names:
+            print(f"wrote {(Path(temporary) / name).replace(folder / name)}")
+
+
+def ztest_parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog=f"{PROGRAM} ztest",
+        description="Renders scenes with MLRT and tests each pixel against its expected "
+        "value by the z-test, significance and pass rule of Mitsuba's own image tests. "
+        "References are those beside the scene (refs/NAME_ref_rgb.exr and _var.exr), else "
+        "they are rendered by Mitsuba's scalar_rgb and kept. Or tests an EXR file.",
+        epilog="Exit codes: 0 all pass, 2 one fails, 4 one could not be tested. The "
+        "p-value of the image's mean is told, but is no part of Mitsuba's rule.",
+    )
+    parser.add_argument(
+        "inputs",
+        type=Path,
+        nargs="+",
+        metavar="SCENE|IMAGE",
+        help="XML files; or three EXR files, with --spp: image, reference, variance of a "
+        "sample",
+    )
+    add_scene_choices(parser)
+    parser.add_argument(
+        "--spp",
+        type=at_least(1),
+        help=f"samples a pixel of what is tested ({SAMPLE_BUDGET} by the number of pixels)",
+    )
+    parser.add_argument(
+        "--reference-spp",
+        type=at_least(1),
+        metavar="N",
+        help=f"samples a pixel of a reference that is rendered ({REFERENCE_FACTOR} times)",
+    )
+    parser.add_argument(
+        "--authored",
+        action="store_true",
+        help="render references by the scene's own integrator, whose variance then counts, "
+        "in place of direct with one emitter sample, which MLRT renders",
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="folder that references are kept in (~/.cache/mlrt-compare)",
+    )
+    add_output_options(parser, "maps of the p-values as PNG")
+    return parser

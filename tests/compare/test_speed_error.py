@@ -1,0 +1,120 @@
+"""mlrt-compare speed-error: figures of a small run, and what it refuses to call faster."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import repository
+from mlrt_compare.cli import main
+from PIL import Image as Pillow
+
+SCENE = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
+SMALL = ("--resolution", "48x48", "--spp", "1,2,4,8", "--rounds", "6")
+
+# Runs the command with MLRT's images bent by a function.
+BENT = """
+import sys
+from mlrt_compare import cli, llvm
+llvm.activate()
+from mlrt_compare.mlrt_renderer import MlrtRenderer
+right = MlrtRenderer.image.fget
+MlrtRenderer.image = property(lambda renderer: bend(right(renderer)))
+def bend(image):
+    return {how}
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+def python(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        env=dict(os.environ),
+    )
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("references")
+
+
+def test_a_small_run(tmp_path: Path, cache: Path) -> None:
+    child = python(
+        *("-m", "mlrt_compare", "speed-error", SCENE, *SMALL),
+        *("--cache", cache, "-o", tmp_path / "out"),
+    )
+    assert child.returncode == 0, child.stdout + child.stderr
+    names = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert names == [f"cornell-box-speed-error.{kind}" for kind in ("json", "md", "png")]
+    told = json.loads((tmp_path / "out" / names[0]).read_text())
+    assert told["passed"] and told["reference"]["spp"] == 8 * 64
+    mlrt, mitsuba = told["sides"]
+    for side in (mlrt, mitsuba):
+        assert [point["spp"] for point in side["points"]] == [1, 2, 4, 8]
+        for point in side["points"]:
+            assert len(point["seconds"]) == len(point["mse_runs"]) == 6
+            assert point["first"] > 0 and point["median"] > 0
+    # The same random numbers: the same error, run by run.
+    for ours, theirs in zip(mlrt["points"], mitsuba["points"], strict=True):
+        assert ours["mse_runs"] == pytest.approx(theirs["mse_runs"], rel=0.02)
+    assert -1.2 < mlrt["slope"]["value"] < -0.8
+    assert mlrt["points"][0]["jit"] is None and mitsuba["points"][0]["jit"] is not None
+    assert told["machine"]["processor"] and told["machine"]["llvm"]
+    text = (tmp_path / "out" / names[1]).read_text()
+    assert text in child.stdout and "**PASS**" in text
+    with Pillow.open(tmp_path / "out" / names[2]) as picture:
+        assert picture.size[0] > 600
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        ("image * 0.97", "the means differ by"),
+        ("image + 0.5", "falls with samples to the power of"),
+        ("image[..., ::-1]", "so the estimators are not the same"),
+    ],
+)
+def test_a_wrong_image_is_no_speed_up(tmp_path: Path, how: str, said: str) -> None:
+    child = python(
+        *("-c", BENT.format(how=how), "speed-error", SCENE, *SMALL),
+        *("--cache", tmp_path / "cache", "-o", tmp_path),
+    )
+    assert child.returncode == 2, child.stdout + child.stderr
+    assert "**FAIL: " in child.stdout and said in child.stdout
+
+
+def test_a_missing_scene_is_one_sentence(tmp_path: Path) -> None:
+    child = python("-m", "mlrt_compare", "speed-error", "none.xml", "-o", tmp_path)
+    lines = child.stderr.splitlines()
+    assert child.returncode == 4 and len(lines) == 1 and "none.xml" in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "SCENE"),
+        ((SCENE, "--spp", "1,0"), "0 is less than 1"),
+        ((SCENE, "--spp", "many"), "'many' is not a whole number"),
+        ((SCENE, "--rounds", "3"), "3 is less than 4"),
+        ((SCENE, "-o", SCENE), "not a folder"),
+        ((SCENE, "--cache", SCENE), "--cache"),
+    ],
+)
+def test_what_cannot_run_is_one_sentence(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[object, ...],
+    said: str,
+) -> None:
+    output = () if "-o" in arguments else ("-o", tmp_path / "output")
+    assert main(["speed-error", *map(str, (*arguments, *output))]) == 4
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and said in lines[0]
+    assert not list(tmp_path.iterdir())
