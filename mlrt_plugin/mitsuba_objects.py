@@ -88,6 +88,18 @@ def members(instance: Any) -> dict[str, Any]:
     }
 
 
+def set_members(instance: Any, values: dict[str, npt.NDArray[Any]]) -> None:
+    """Fills arrays that an object shows to ``mi.traverse``, and tells it."""
+    module = variant_module(instance)
+    listener = _listener(module, instance.variant_name())()
+    instance.traverse(listener)
+    for name, value in values.items():
+        place, cpptype = listener.found[name]
+        kind = type(module.get_property(place, cpptype, instance))
+        module.set_property(place, cpptype, kind(value))
+    instance.parameters_changed(list(values))
+
+
 def described(instance: Any, name: str, default: str = "") -> str:
     """A parameter that only the printed description of an object tells."""
     match = re.search(rf"\b{name} = ([^\s,\]]+)", str(instance))

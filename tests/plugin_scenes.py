@@ -194,6 +194,21 @@ SCENES = {
             for i in range(3)
         )
     ),
+    "instances of meshes": scene(
+        '<shape type="shapegroup" id="group"><shape type="cube"><transform name="to_world">'
+        '<scale value="0.3"/></transform>'
+        + bsdf("diffuse", texture("reflectance", "checkerboard"))
+        + '</shape><shape type="ply"><string name="filename" value="smooth.ply"/>'
+        + bsdf("twosided", bsdf("roughplastic"))
+        + "</shape></shape>"
+        + "".join(
+            f'<shape type="instance"><ref id="group"/><transform name="to_world">'
+            f'<scale x="{(-1) ** i}" y="{0.6 + 0.2 * i}" z="1"/>'
+            f'<rotate y="1" angle="{50 * i}"/>'
+            f'<translate x="{1.2 * i - 1.2}" y="0.5"/></transform></shape>'
+            for i in range(3)
+        )
+    ),
     "meshes": scene(
         scene_files.mesh_shape("triangle.obj")
         + scene_files.mesh_shape("square.ply").replace('id="mesh"', "")
@@ -343,6 +358,7 @@ def write_assets(folder: Path) -> None:
     write_grid(folder / "grid.vol")
     corners = [(-1.0, 0.0, 0.5), (-0.2, 0.0, 0.5), (-0.6, 0.9, 0.5)]
     (folder / "coloured.ply").write_text(coloured_ply(corners))
+    (folder / "smooth.ply").write_text(smooth_ply())
     (folder / "ellipsoids.ply").write_text(ellipsoids_ply())
 
 
@@ -381,3 +397,14 @@ def ellipsoids_ply() -> str:
         "0 0.6 0 0 0 0 -1.5 -1 -1 1 0 0 0",
     ]
     return "\n".join(lines) + "\n"
+
+
+def smooth_ply() -> str:
+    """A tent of two triangles with bent normals and texture coordinates."""
+    names = ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
+    lines = ["ply", "format ascii 1.0", "element vertex 4"]
+    lines += [f"property float {name}" for name in names]
+    lines += ["element face 2", "property list uchar int vertex_indices", "end_header"]
+    lines += ["-0.4 0.4 0.3 -0.6 0 0.8 0 0", "0.4 0.4 0.3 0.6 0 0.8 1 0"]
+    lines += ["0 0.9 0.5 0 0.6 0.8 0.5 1", "0 0 0.5 0 -0.6 0.8 0.5 0"]
+    return "\n".join([*lines, "3 0 1 2", "3 0 3 1"]) + "\n"

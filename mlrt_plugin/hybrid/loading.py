@@ -17,11 +17,10 @@ from .. import mitsuba_objects as objects
 from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
 from ..scene_arrays import Lighting
+from .instances import check_instances, without_instances
 from .mitsuba_log import captured_warnings
 
 VARIANT = "llvm_ad_rgb"
-LARGEST_INSTANCE_COUNT = 500
-"""Chosen: Mitsuba's llvm variants take about a quarter of a second to compile each."""
 IGNORED = {
     "medium": "participating media have no effect on direct illumination as `direct` "
     "renders it",
@@ -91,7 +90,6 @@ def load_scene(
     lighting = lighting or scene_import.lighting_of(source, root)
     integrators.check_integrator(found, lighting, force_direct)
     features.refuse_refused(root, sensor)
-    check_instances(sum(e.plugin == "instance" for e in root.children_of("shape")))
     check_numbers(root, sensor)
     scene_import.check_transforms(parsed, sensor)
     scene_import.check_files(parsed)
@@ -102,7 +100,7 @@ def load_scene(
         *ignored(root, sensor),
     ]
     with captured_warnings() as messages:
-        scene, by_id = parsing.instantiate_scene(parsed)
+        scene, by_id = instantiated(parsed)
     chosen = list(root.children_of("sensor"))[sensor]
     eye = next(s for s in scene.sensors() if by_id.get(s.id()) is chosen)
     check_film(eye.film(), str(next(chosen.children_of("film"), chosen)))
@@ -110,6 +108,29 @@ def load_scene(
     names = [str(by_id.get(shape.id(), shape.id())) for shape in scene.shapes()]
     warnings += messages
     return MitsubaScene(scene, eye, names, lighting, tuple(dict.fromkeys(warnings)))
+
+
+def instantiated(parsed: parsing.ParsedScene) -> tuple[Any, dict[str, Element]]:
+    """The scene of Mitsuba, instances of meshes written out, and the elements by the ids of
+    what they became."""
+    if not any(e.plugin == "instance" for e in parsed.root.children_of("shape")):
+        return parsing.instantiate_scene(parsed)
+    parts, by_id = parsing.instantiate(parsed)
+    groups = {
+        id_: parsed.state.nodes[int(id_[1:])]
+        for id_, element in by_id.items()
+        if element.plugin == "shapegroup"
+    }
+    children = {
+        id_: [o for _, o in node.props.objects() if elements.kind_of(o) == "shape"]
+        for id_, node in groups.items()
+    }
+    properties = mi.Properties("scene")
+    for number, part in enumerate(without_instances(parts, by_id, children)):
+        properties[f"part_{number}"] = part
+    module = getattr(mi, VARIANT)
+    scene = parsing.reported(lambda: module.Scene(properties), parsed.name, parsed.elements)
+    return scene, by_id
 
 
 def of_loaded(
@@ -146,16 +167,6 @@ def of_loaded(
     warnings = integrators.integrator_warnings(found, lighting, native=False)
     names = [str(elements.from_object(shape)) for shape in scene.shapes()]
     return MitsubaScene(scene, eye, names, lighting, tuple(warnings))
-
-
-def check_instances(count: int) -> None:
-    """Raises UnsupportedFeature for more instances than Mitsuba can deal with."""
-    if count > LARGEST_INSTANCE_COUNT:
-        raise UnsupportedFeature(
-            f"the scene has {count} shapes of type 'instance', and Mitsuba's {VARIANT} "
-            f"compiles code for each of them: keep to {LARGEST_INSTANCE_COUNT}, or write "
-            "them out as meshes"
-        )
 
 
 def check_emitters(scene: Any, names: Mapping[str, str]) -> None:
