@@ -289,7 +289,11 @@ def render(
     with thread_count(threads):
         prepared = prepare(scene, sensor=sensor, defines=defines, **of_scene, **build)
         prepared.warn(stacklevel=2)
-        return prepared.render(spp=spp, seed=seed, aovs=aovs, progress=progress, **trace)
+        result = prepared.render(spp=spp, seed=seed, aovs=aovs, progress=progress, **trace)
+        for message in result.warnings:
+            if message not in prepared.warnings:
+                warnings.warn(message, MlrtWarning, stacklevel=2)
+        return result
 
 
 def checked_spp(spp: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -43,6 +44,15 @@ def test_render_and_info(scene: Path, capsys: pytest.CaptureFixture[str]) -> Non
         assert expected in text
     assert main(["info", str(scene), "--shading", "native"]) == 0
     assert "not supported:" in capsys.readouterr().out
+
+
+def test_tree_of_the_meshes(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tree", str(scene), "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["triangles"] == 2 + 2 + 12  # floor, panel, cube
+    scene.write_text(parts.scene(parts.block("", 0, "sphere"), lights=parts.LAMP, floor=""))
+    assert main(["tree", str(scene)]) == 1
+    assert "has no triangle meshes" in capsys.readouterr().err
 
 
 def test_cost_is_of_native_shading(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
