@@ -117,7 +117,7 @@ def scene_of_tree(arguments: argparse.Namespace) -> TreeScene:
     from .hybrid.loading import load_scene
 
     loaded = load_scene(arguments.scene, reason=choice.reason, **what, force_direct=True)
-    faces = mesh_faces(loaded.scene, loaded.names)
+    faces = mesh_faces(loaded.shapes, loaded.names)
     if faces is None:
         raise SceneError(f"{arguments.scene} has no triangle meshes, and so no tree")
     geometry = faces.geometry
