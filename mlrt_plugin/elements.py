@@ -34,6 +34,16 @@ class Element:
         for _, child in self.children:
             yield from child.walk()
 
+    def walk_new(self, seen: set[int]) -> Iterator[Element]:
+        """This element and all that it holds, without those whose `id` is in `seen`, which
+        grows by those that are passed."""
+        if id(self) in seen:
+            return
+        seen.add(id(self))
+        yield self
+        for _, child in self.children:
+            yield from child.walk_new(seen)
+
     def __str__(self) -> str:
         name = f"{self.kind} '{self.plugin}'"
         if self.id:

@@ -50,10 +50,7 @@ def used_elements(scene: Element, sensor: int) -> Iterator[Element]:
                 continue
             if kind == "emitter" and child.plugin == "area":
                 continue  # it counts where a shape refers to it
-            for element in child.walk():
-                if id(element) not in seen:
-                    seen.add(id(element))
-                    yield element
+            yield from child.walk_new(seen)
 
 
 def reason_against(element: Element) -> str:

@@ -289,13 +289,6 @@ def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
     return loaded(parsed).parts, by_id
 
 
-def instantiate_scene(parsed: ParsedScene) -> tuple[Any, dict[str, Element]]:
-    """Loads a parsed scene as a scene of Mitsuba, and tells which element each object came
-    from, by its id. Its integrator is a `direct` that stands in for the scene's own."""
-    by_id = numbered(parsed)
-    return loaded(parsed), by_id
-
-
 def numbered(parsed: ParsedScene) -> dict[str, Element]:
     """Gives all nodes ids by which to find their elements, and takes integrators out."""
     by_id = {}

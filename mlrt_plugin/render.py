@@ -46,10 +46,12 @@ class RenderResult:
     image: (H, W, 3) float32, linear RGB.
     aovs: by name: depth (H, W) float32, distance from the near plane in scene units, 0 for
     a miss; normal (H, W, 3) float32, shading normal in world space; both are filtered as
-    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss.
+    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss
+    and for shapes that are not in the tree.
     timings: seconds of load, build and render; with a cache of trees those that
     `ObtainedTree` names in place of build.
-    counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays.
+    counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays;
+    none where Mitsuba shades.
     warnings: what was approximated or ignored.
     """
 
@@ -306,7 +308,7 @@ def render(
     with thread_count(threads):
         prepared = prepare(scene, sensor=sensor, defines=defines, **of_scene, **build)
         prepared.warn(stacklevel=2)
-        return prepared.render(
+        result = prepared.render(
             spp=spp,
             seed=seed,
             aovs=aovs,
@@ -314,6 +316,10 @@ def render(
             progress=progress,
             **trace,
         )
+        for message in result.warnings:
+            if message not in prepared.warnings:
+                warnings.warn(message, MlrtWarning, stacklevel=2)
+        return result
 
 
 def checked_spp(spp: int) -> int:

@@ -7,13 +7,20 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from ._dispatch import core
+from .errors import SceneError
 from .options import BUILD_OPTIONS, BUILDERS
 from .peak_memory import PeakMemory
+from .scene_arrays import Lighting, SceneArrays
 from .scene_import import import_scene
+from .shading_choice import choose_shading
 from .threads import thread_count
 from .tree_cache import obtain_tree
 from .tree_report import dropped_by_mesh, invisible_meshes, report_lines, tree_report
@@ -79,32 +86,69 @@ def build_options_of(arguments: argparse.Namespace) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None}
 
 
+@dataclass(frozen=True)
+class TreeScene:
+    """What a tree is built of, natively or for Mitsuba to shade.
+
+    arrays: of a native scene.
+    """
+
+    vertices: npt.NDArray[np.float32]
+    faces: npt.NDArray[np.uint32]
+    lighting: Lighting
+    warnings: tuple[str, ...]
+    arrays: SceneArrays | None = None
+
+
+def scene_of_tree(arguments: argparse.Namespace) -> TreeScene:
+    """Reads the scene that is named; raises SceneError if it has no triangles."""
+    what: dict[str, Any] = {
+        "sensor": arguments.sensor,
+        "defines": dict(arguments.define),
+    }
+    choice = choose_shading(arguments.scene, **what)
+    if choice.path == "native":
+        arrays = import_scene(arguments.scene, **what, force_direct=True)
+        return TreeScene(
+            arrays.vertices, arrays.faces, arrays.lighting, arrays.warnings, arrays
+        )
+    # Not loaded where it is not used: Mitsuba's llvm variant takes a while.
+    from .hybrid.hit_scene import mesh_faces
+    from .hybrid.loading import load_scene
+
+    loaded = load_scene(arguments.scene, reason=choice.reason, **what, force_direct=True)
+    faces = mesh_faces(loaded.shapes, loaded.names)
+    if faces is None:
+        raise SceneError(f"{arguments.scene} has no triangle meshes, and so no tree")
+    geometry = faces.geometry
+    warnings = (*loaded.warnings, *geometry.warnings)
+    return TreeScene(geometry.vertices, geometry.faces, loaded.lighting, warnings)
+
+
 def run_tree(arguments: argparse.Namespace) -> None:
     with thread_count(arguments.threads):
         start = time.perf_counter()
-        arrays = import_scene(
-            arguments.scene,
-            sensor=arguments.sensor,
-            defines=dict(arguments.define),
-            force_direct=True,
-        )
+        scene = scene_of_tree(arguments)
         loaded = time.perf_counter()
         with PeakMemory() as peak:
             obtained = obtain_tree(
-                arrays.vertices,
-                arrays.faces,
+                scene.vertices,
+                scene.faces,
                 {
-                    **arrays.lighting.own_options(BUILD_OPTIONS),
+                    **scene.lighting.own_options(BUILD_OPTIONS),
                     **build_options_of(arguments),
                 },
                 arguments.tree_cache,
             )
         tree = obtained.tree
         report = {**tree_report(tree), "peak_bytes": peak.bytes}
-    warnings = arrays.warnings + obtained.warnings + invisible_meshes(tree, arrays)
+    warnings = scene.warnings + obtained.warnings
+    dropped: dict[str, int] = {}
+    if scene.arrays is not None:
+        warnings += invisible_meshes(tree, scene.arrays)
+        dropped = dropped_by_mesh(tree, scene.arrays)
     for message in warnings:
         print(f"mlrt: warning: {message}", file=sys.stderr)
-    dropped = dropped_by_mesh(tree, arrays)
     options = core.tree_options(tree)
     timings = {"load": loaded - start, **obtained.timings}
     if arguments.json:

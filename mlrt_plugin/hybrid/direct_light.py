@@ -50,6 +50,12 @@ class DirectLight:
         self._emitter_samples = emitter_samples
         self._bsdf_samples = bsdf_samples
         self._hide_emitters = hide_emitters
+        # Rays find the lights that have a place or are all around; others cannot be hit.
+        self._lights_can_be_hit = any(
+            emitter.is_environment()
+            or module.has_flag(emitter.flags(), mi.EmitterFlags.Surface)
+            for emitter in scene.emitters()
+        )
         total = max(1, emitter_samples + bsdf_samples)
         self._emitter_share = emitter_samples / total
         self._bsdf_share = bsdf_samples / total
@@ -71,7 +77,7 @@ class DirectLight:
         smooth = module.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
         for _ in range(self._emitter_samples):
             radiance += self._emitter_sample(si, bsdf, sampler, active & smooth)
-        for _ in range(self._bsdf_samples):
+        for _ in range(self._bsdf_samples if self._lights_can_be_hit else 0):
             radiance += self._bsdf_sample(si, bsdf, sampler, active)
         return radiance, primary
 

@@ -24,7 +24,7 @@ from ..tree import trace_options
 class MeshFaces:
     """The faces of all meshes of a scene, one after the other, and where each came from.
 
-    shape_of_face: (F,) UInt32, number in `scene.shapes()`.
+    shape_of_face: (F,) UInt32, number of the shape.
     first_face: (S,) UInt32, number of a shape's first face; 0 for a shape that is no mesh.
     """
 
@@ -40,13 +40,11 @@ def is_triangle_mesh(shape: Any) -> bool:
     return bool(shape.is_mesh()) and objects.plugin_name(shape) != "EllipsoidsMesh"
 
 
-def mesh_faces(scene: Any, names: list[str]) -> MeshFaces | None:
-    """Gathers the meshes of a loaded scene; `names` tell its shapes apart in messages.
+def mesh_faces(shapes: list[Any], names: list[str]) -> MeshFaces | None:
+    """Gathers the meshes among loaded shapes; `names` tell these apart in messages.
 
     None if there is no mesh. Raises SceneError as `meshes.gather` does.
     """
-    module = objects.variant_module(scene)
-    shapes = list(scene.shapes())
     numbers = [n for n, shape in enumerate(shapes) if is_triangle_mesh(shape)]
     if not numbers:
         return None
@@ -54,25 +52,24 @@ def mesh_faces(scene: Any, names: list[str]) -> MeshFaces | None:
     first_face = np.zeros(len(shapes), np.uint32)
     first_face[numbers] = geometry.first_faces
     shape_of_face = np.repeat(np.array(numbers, np.uint32), geometry.face_counts)
+    module = objects.variant_module(shapes[numbers[0]])
     return MeshFaces(
         geometry, module.UInt32(shape_of_face), module.UInt32(first_face), len(numbers)
     )
 
 
-def other_shapes(scene: Any) -> Any:
-    """A scene of those shapes that are no triangle meshes; None if there is none."""
-    others = [shape for shape in scene.shapes() if not is_triangle_mesh(shape)]
+def other_shapes(shapes: list[Any], groups: list[Any]) -> Any:
+    """A scene of those shapes that are no triangle meshes; None if there is none.
+
+    groups: what instances among the shapes refer to.
+    """
+    others = [shape for shape in shapes if not is_triangle_mesh(shape)]
     if not others:
         return None
-    groups = [
-        part
-        for part in objects.members(scene).values()
-        if isinstance(part, mi.Object) and part.class_name() == "ShapeGroupPlugin"
-    ]
     properties = mi.Properties("scene")
     for number, shape in enumerate((*groups, *others)):
         properties[f"shape_{number}"] = shape
-    return objects.variant_module(scene).Scene(properties)
+    return objects.variant_module(others[0]).Scene(properties)
 
 
 def copied(kind: type, values: npt.NDArray[Any]) -> Any:
@@ -91,18 +88,18 @@ class HitScene:
 
     def __init__(
         self,
-        scene: Any,
+        shapes: list[Any],
         tree: Any,
         faces: MeshFaces | None,
         others: Any,
         options: Mapping[str, Any],
     ) -> None:
-        """scene: loaded in `llvm_ad_rgb`. tree: of `faces`, a tree of the core; both are
+        """shapes: loaded in `llvm_ad_rgb`. tree: of `faces`, a tree of the core; both are
         None if there is no mesh. others: what `other_shapes` gives. options: of
         `TraceOptions`.
         """
-        self._module = objects.variant_module(scene)
-        self._shapes = scene.shapes_dr()
+        self._module = objects.variant_module(shapes[0])
+        self._shapes = self._module.ShapePtr(shapes)
         self._tree = tree
         self._faces = faces
         self._others = others

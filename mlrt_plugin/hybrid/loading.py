@@ -18,9 +18,12 @@ from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
 from ..scene_arrays import Lighting
 from .instances import check_instances, without_instances
+from .light_scene import light_scene
 from .mitsuba_log import captured_warnings
 
 VARIANT = "llvm_ad_rgb"
+GROUP = "ShapeGroupPlugin"
+"""Mitsuba's class of the plugin `shapegroup`."""
 IGNORED = {
     "medium": "participating media have no effect on direct illumination as `direct` "
     "renders it",
@@ -32,11 +35,14 @@ IGNORED = {
 class MitsubaScene:
     """A scene that Mitsuba has loaded, one of its sensors, and what is asked for.
 
-    names: what messages call the shapes, in the order of `scene.shapes()`.
+    scene: has all lights, but maybe not all shapes. shapes: all but groups, which are
+    shapes that instances refer to. names: what messages call the shapes.
     warnings: what is approximated or ignored, a sentence each.
     """
 
     scene: Any
+    shapes: list[Any]
+    groups: list[Any]
     sensor: Any
     names: list[str]
     lighting: Lighting
@@ -100,37 +106,37 @@ def load_scene(
         *ignored(root, sensor),
     ]
     with captured_warnings() as messages:
-        scene, by_id = instantiated(parsed)
+        parts, by_id = instantiated(parsed)
+        groups = [part for part in parts if part.class_name() == GROUP]
+        shapes = [p for p in parts if elements.kind_of(p) == "shape" and p not in groups]
+        scene = parsing.reported(
+            lambda: light_scene(parts, shapes), parsed.name, parsed.elements
+        )
     chosen = list(root.children_of("sensor"))[sensor]
     eye = next(s for s in scene.sensors() if by_id.get(s.id()) is chosen)
     check_film(eye.film(), str(next(chosen.children_of("film"), chosen)))
     check_emitters(scene, {id_: str(element) for id_, element in by_id.items()})
-    names = [str(by_id.get(shape.id(), shape.id())) for shape in scene.shapes()]
+    names = [str(by_id.get(shape.id(), shape.id())) for shape in shapes]
     warnings += messages
-    return MitsubaScene(scene, eye, names, lighting, tuple(dict.fromkeys(warnings)))
+    return MitsubaScene(
+        scene, shapes, groups, eye, names, lighting, tuple(dict.fromkeys(warnings))
+    )
 
 
-def instantiated(parsed: parsing.ParsedScene) -> tuple[Any, dict[str, Element]]:
-    """The scene of Mitsuba, instances of meshes written out, and the elements by the ids of
+def instantiated(parsed: parsing.ParsedScene) -> tuple[list[Any], dict[str, Element]]:
+    """The parts of a scene, instances of meshes written out, and the elements by the ids of
     what they became."""
-    if not any(e.plugin == "instance" for e in parsed.root.children_of("shape")):
-        return parsing.instantiate_scene(parsed)
     parts, by_id = parsing.instantiate(parsed)
-    groups = {
+    nodes = {
         id_: parsed.state.nodes[int(id_[1:])]
         for id_, element in by_id.items()
         if element.plugin == "shapegroup"
     }
     children = {
         id_: [o for _, o in node.props.objects() if elements.kind_of(o) == "shape"]
-        for id_, node in groups.items()
+        for id_, node in nodes.items()
     }
-    properties = mi.Properties("scene")
-    for number, part in enumerate(without_instances(parts, by_id, children)):
-        properties[f"part_{number}"] = part
-    module = getattr(mi, VARIANT)
-    scene = parsing.reported(lambda: module.Scene(properties), parsed.name, parsed.elements)
-    return scene, by_id
+    return without_instances(parts, by_id, children), by_id
 
 
 def of_loaded(
@@ -165,8 +171,14 @@ def of_loaded(
         )
     check_film(eye.film(), str(elements.from_object(eye.film())))
     warnings = integrators.integrator_warnings(found, lighting, native=False)
-    names = [str(elements.from_object(shape)) for shape in scene.shapes()]
-    return MitsubaScene(scene, eye, names, lighting, tuple(warnings))
+    shapes = list(scene.shapes())
+    groups = [
+        part
+        for part in objects.members(scene).values()
+        if isinstance(part, mi.Object) and part.class_name() == GROUP
+    ]
+    names = [str(elements.from_object(shape)) for shape in shapes]
+    return MitsubaScene(scene, shapes, groups, eye, names, lighting, tuple(warnings))
 
 
 def check_emitters(scene: Any, names: Mapping[str, str]) -> None:

@@ -117,7 +117,7 @@ class PreparedHybrid:
         asked = checked_spp(self.spp if spp is None else spp)
         samples = possible_spp(sampler, asked)
         trace = {**lighting.own_options(TRACE_OPTIONS), **options}
-        hits = HitScene(loaded.scene, self.tree, self.faces, self.others, trace)
+        hits = HitScene(loaded.shapes, self.tree, self.faces, self.others, trace)
         depth = lighting.integrator == "depth"
         light = DirectLight(
             loaded.module,
@@ -199,8 +199,8 @@ def prepare_hybrid(
         lighting=lighting,
         force_direct=force_direct,
     )
-    faces = mesh_faces(loaded.scene, loaded.names)
-    others = other_shapes(loaded.scene)
+    faces = mesh_faces(loaded.shapes, loaded.names)
+    others = other_shapes(loaded.shapes, loaded.groups)
     build = {**loaded.lighting.own_options(BUILD_OPTIONS), **build}
     after = time.perf_counter()
     obtained = ObtainedTree(None)

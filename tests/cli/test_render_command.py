@@ -81,7 +81,7 @@ def test_warnings_are_told(
 def test_interruption(scene_file: SceneFile) -> None:
     path = scene_file()
     command = Path(sys.executable).with_name("mlrt")
-    flags = ["--resolution", "4096x4096", "--spp", "250"]
+    flags = ["--resolution", "4096x4096", "--spp", "4096"]
     with subprocess.Popen(
         [command, "render", path, *flags],
         stdout=subprocess.PIPE,

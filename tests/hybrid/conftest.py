@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import mitsuba as mi
-import plugin_scenes
+import plugin_assets
 import pytest
 
 import mlrt_llvm
@@ -30,5 +30,5 @@ def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the scenes refer to."""
     mi.set_variant("scalar_rgb")
     folder = tmp_path_factory.mktemp("assets")
-    plugin_scenes.write_assets(folder)
+    plugin_assets.write_assets(folder)
     return folder

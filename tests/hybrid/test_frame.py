@@ -11,7 +11,7 @@ import numpy as np
 import plugin_scenes as parts
 import pytest
 
-from mlrt_plugin import prepare, render
+from mlrt_plugin import MlrtWarning, prepare, render
 from mlrt_plugin.hybrid import samplers
 from mlrt_plugin.hybrid.samplers import IndependentStream, Pass, passes
 
@@ -96,8 +96,8 @@ def test_other_samplers_in_passes_have_the_same_mean(
 
 def test_samplers_that_round_say_so(assets: Path) -> None:
     path = written(assets, eye=parts.sensor(sampler="stratified", spp=16))
-    result = prepare(path).render(spp=10)
-    assert any("takes 16 samples a pixel in place of 10" in w for w in result.warnings)
+    with pytest.warns(MlrtWarning, match="takes 16 samples a pixel in place of 10"):
+        render(path, spp=10)
 
 
 def test_aovs_are_those_of_mitsuba(assets: Path) -> None:
@@ -158,3 +158,16 @@ def test_depth_is_that_of_mitsuba(assets: Path) -> None:
     image = render(path, seed=1).image
     differing = np.abs(image - expected).max(axis=-1) > 1e-4 * expected.max()
     assert np.count_nonzero(differing) <= 2 and image.max() > 0
+
+
+def test_mitsubas_scene_has_the_lights_and_the_bounds_only(assets: Path) -> None:
+    """No second acceleration structure is built over what is in the tree."""
+    path = written(assets)
+    loaded = prepare(path).loaded
+    whole = mi.load_file(str(path), optimize=False)
+    assert len(loaded.shapes) == len(whole.shapes()) == 8
+    assert [s.is_emitter() for s in loaded.scene.shapes()] == [True, False]
+    assert len(loaded.scene.emitters()) == len(whole.emitters()) == 2
+    bounds, expected = loaded.scene.bbox(), whole.bbox()
+    np.testing.assert_array_equal(np.array(bounds.min), np.array(expected.min))
+    np.testing.assert_array_equal(np.array(bounds.max), np.array(expected.max))

@@ -64,7 +64,7 @@ class FrameBenchmark:
         self._name = name
         self._settings = settings
         side = settings.resolution
-        wanted = compare_settings.Settings(path, resolution=(side, side))
+        wanted = compare_settings.Settings(path, resolution=(side, side), shading="native")
         show_status(f"{name}: loading")
         with thread_count(max(settings.threads)):
             try:
