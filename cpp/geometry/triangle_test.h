@@ -28,6 +28,9 @@ namespace mlrt {
 inline constexpr float FLOAT_ROUNDOFF = 0x1p-24f;
 inline constexpr double DOUBLE_ROUNDOFF = 0x1p-53;
 
+// Twice the greatest error of rounding to a denormal float.
+inline constexpr float SMALLEST_FLOAT = 0x1p-149f;
+
 // How far the decision of a ray had to go.
 enum class Precision : uint32_t { filtered, exact };
 

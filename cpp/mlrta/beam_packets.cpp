@@ -29,6 +29,10 @@ constexpr float LEAST_SLACK = 0x1p-120f;
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
 constexpr float SMALLEST_DEPTH = 0x1p-120f;
 
+// Distances below it may be denormal once they are rounded, and then equal where depths
+// differ: of none of them it is certain which one is nearer.
+constexpr float SMALLEST_DISTANCE = 0x1p-125f;
+
 FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
     return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
 }
@@ -86,10 +90,14 @@ void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
     const FloatPacket end = t_max * main;
     const FloatPacket before_end =
         maximum(end * (1 - WIDEN_DEPTH) - SMALLEST_DEPTH, FloatPacket(0.0f));
-    packet.least =
-        masked(packet.active, 1.0f / (end * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH), INFINITE);
+    // What is rounded to a denormal t_max may exceed it by more than that share.
+    const FloatPacket beyond_end =
+        (t_max + SMALLEST_FLOAT) * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
+    packet.least = masked(packet.active, 1.0f / beyond_end, INFINITE);
     packet.greatest = 1.0f / before_end;
-    const FloatPacket begin = t_min * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
+    const FloatPacket begin =
+        maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
+        SMALLEST_DEPTH;
     packet.nearest = (1 - WIDEN_DEPTH) / greatest_lane(masked(packet.active, begin, 0.0f));
 }
 

@@ -211,11 +211,14 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
         }
         packet.found |= 1u << lane;
         best[lane] = primitive;
-        // Of the distance, of the product, and of the reciprocal.
-        const double depth = double(t) * std::abs(direction[beam_.axes[2]]);
-        least[lane] = query == Query::any ? INFINITE
-                                          : float(std::min((1 - 0x1p-21) / depth, 0x1p126));
-        greatest[lane] = float((1 + 0x1p-21) / depth);
+        // Of the distance, of the product, and of the reciprocal; and of a distance that
+        // is denormal.
+        const double main = std::abs(direction[beam_.axes[2]]);
+        const double farthest = (double(t) + SMALLEST_FLOAT) * main;
+        least[lane] = query == Query::any
+                          ? INFINITE
+                          : float(std::min((1 - 0x1p-21) / farthest, 0x1p126));
+        greatest[lane] = float((1 + 0x1p-21) / (double(t) * main));
     });
     packet.least = load<FloatPacket>(least);
     packet.greatest = load<FloatPacket>(greatest);

@@ -1,5 +1,7 @@
 #include "mlrta/inverse_frustum.h"
 
+#include "geometry/triangle_test.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -56,7 +58,7 @@ InverseFrustum::InverseFrustum(const Beam &beam) {
 // A hit counts if its distance is at most t_max once it has been rounded to float, which
 // may be half a unit in the last place less than the exact one.
 void InverseFrustum::shorten(double t_max) {
-    constexpr double ROUNDED = 1 + 0x1p-23, SMALLEST_FLOAT = 0x1p-149;
+    constexpr double ROUNDED = 1 + 0x1p-23;
     constexpr float INFINITE = std::numeric_limits<float>::infinity();
     const double end = t_max * ROUNDED + SMALLEST_FLOAT;
     alignas(32) std::array<float, 8> least;

@@ -84,7 +84,7 @@ std::optional<double> covered_until(const Beam &beam, const Triangle &triangle) 
     }
     // Each is off by a few roundings, and by one to float for a reported distance: half a
     // unit in the last place, or half the smallest float.
-    constexpr double BELOW = 1 - 0x1p-22, ABOVE = 1 + 0x1p-22, SMALLEST_FLOAT = 0x1p-149;
+    constexpr double BELOW = 1 - 0x1p-22, ABOVE = 1 + 0x1p-22;
     const double first =
         (sign * numerator - error) / (greatest + sum_error) * least_scale * BELOW -
         SMALLEST_FLOAT;

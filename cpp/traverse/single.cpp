@@ -49,6 +49,12 @@ struct ScaledRay {
     }
 
     float parameter(float t) const { return float(t / scale); }
+
+    // That of the latest distance that may be rounded to t, but for the margin of
+    // ParameterInterval: a denormal t is off by more than that share.
+    float latest_parameter(float t) const {
+        return float((double(t) + SMALLEST_FLOAT) / scale);
+    }
 };
 
 } // namespace
@@ -69,7 +75,7 @@ Hit trace_single(const KdTree &tree, const Ray &ray, Query query, const Entry &e
                  Counters &counters) {
     const ScaledRay scaled(ray.direction);
     ParameterInterval<float> interval{scaled.parameter(ray.t_min) * WIDEN_NEAR,
-                                      scaled.parameter(ray.t_max) * WIDEN_FAR +
+                                      scaled.latest_parameter(ray.t_max) * WIDEN_FAR +
                                           TINY_PARAMETER};
     for (int k = 0; k < 3; ++k)
         interval = clip_to_slab(interval, entry.cell.lo[k] - ray.origin[k],
@@ -89,7 +95,7 @@ Hit trace_single(const KdTree &tree, const Ray &ray, Query query, const Entry &e
             const Pending &next = stack[--pending];
             node_index = next.node;
             interval = next.interval;
-            visit = interval.near <= scaled.parameter(best.t);
+            visit = interval.near <= scaled.latest_parameter(best.t);
             continue;
         }
         const KdNode node = tree.node(node_index);

@@ -5,21 +5,28 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import workloads
+from hard_cases.case import grid, joined
 from mlrt_compare.bench.closed_meshes import (
     ClosedMesh,
     boundary,
     chosen_meshes,
     closed,
     inner_points,
+    is_inside,
     slivers,
+    solid_angles,
     sphere,
     usual_meshes,
-    winding_numbers,
+    winding_number,
 )
 from mlrt_compare.bench.errors import BenchError
 from repository import ROOT
 
 SEED = 3
+
+
+def winding(mesh: ClosedMesh, *point: float) -> float:
+    return winding_number(solid_angles(mesh, np.float32(point)))
 
 
 def test_boundaries() -> None:
@@ -43,18 +50,47 @@ def test_holes_are_closed() -> None:
         np.arange(27, dtype=np.uint32).reshape(-1, 3),
     )
     assert len(mesh.vertices) == 8 + 1
-    middle = np.zeros((1, 3), np.float32)
-    assert abs(winding_numbers(mesh, middle)[0]) == pytest.approx(1)
+    assert abs(winding(mesh, 0, 0, 0)) == pytest.approx(1)
 
 
 def test_winding_numbers() -> None:
     vertices, faces = workloads.box()
     box = ClosedMesh("box", vertices, faces)
-    points = np.float32([(0, 0, 0), (0.9, -0.9, 0.99), (1.1, 0, 0), (5, 5, 5)])
-    found = winding_numbers(box, points)
+    points = [(0, 0, 0), (0.9, -0.9, 0.99), (1.1, 0, 0), (5, 5, 5)]
+    found = [winding(box, *point) for point in points]
     np.testing.assert_allclose(np.abs(found), [1, 1, 0, 0], atol=1e-12)
     twice = ClosedMesh("twice", vertices, np.concatenate([faces, faces]))
-    np.testing.assert_allclose(winding_numbers(twice, points), 2 * found, atol=1e-12)
+    doubled = [winding(twice, *point) for point in points]
+    np.testing.assert_allclose(doubled, np.multiply(2, found), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("point", "inside"),
+    [
+        ((0.5, 0.25, 0), True),
+        ((5, 5, 5), False),
+        # On a face, an edge, a vertex, and so near to a face that it fills half the view.
+        ((1, 0.25, 0), False),
+        ((1, 1, 0), False),
+        ((1, 1, 1), False),
+        ((0.99999, 0.25, 0), False),
+    ],
+)
+def test_points_on_the_mesh_are_not_inside(point: tuple[float, ...], inside: bool) -> None:
+    """The box has a grid of faces on each side."""
+    sides = []
+    for axis in range(3):
+        vertices, faces = grid(8, axis)
+        for side in (-1, 1):
+            moved = vertices.copy()
+            moved[:, axis] = side
+            # Of the grid across y the normal points backwards.
+            outward = (side == 1) != (axis == 1)
+            sides.append((moved, faces if outward else faces[:, ::-1]))
+    vertices, faces = joined(*sides)
+    mesh = closed("box", vertices, faces)
+    assert len(mesh.vertices) == 6 * 8 * 8 + 2
+    assert is_inside(solid_angles(mesh, np.float32(point))) == inside
 
 
 @pytest.mark.parametrize("make", [sphere, slivers])

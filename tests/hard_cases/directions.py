@@ -7,8 +7,9 @@ import math
 
 import numpy as np
 import workloads
+from workloads import Rays
 
-from .case import HardCase, RaySet, along, case, generator, rows, triangles
+from .case import HardCase, RaySet, along, case, generator, rows, towards, triangles
 
 SIGNS = rows(*(s for s in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(s)))
 """The 26 directions to the neighbours of a cube."""
@@ -162,5 +163,41 @@ def edge_on_the_border_of_a_tile() -> HardCase:
             "from one point": RaySet(along((0, 0, 0), directions)),
             "from the side": RaySet(along((-0.5, 0, 0.5), directions)),
             "from many": RaySet(along(apart, directions)),
+        },
+    )
+
+
+@case(8)
+def distances_that_are_denormal() -> HardCase:
+    """Distances are a few times the smallest float, so that surfaces at other depths are
+    equally near once that is rounded, and the lowest face counts."""
+    vertices, faces = workloads.sphere(2)
+    rng = generator()
+    # Faces in another order, or the nearest would mostly be the lowest anyway.
+    shells = [(vertices * np.float32(r)).astype(np.float32) for r in (0.9, 1.0, 0.95, 1.05)]
+    numbers = np.concatenate([faces + i * len(vertices) for i in range(4)])
+    size, length = np.float32(2.0**-90), np.float32(2.0**58)
+    points = np.concatenate(shells) * size
+    targets = rng.choice(points, 60)
+    origins = (rng.uniform(-0.3, 0.3, (60, 3)) * size).astype(np.float32)
+    shared = (np.float32([0.0625, -0.15, 0.2]) * size).astype(np.float32)
+    scene = points, rng.permutation(numbers).astype(np.uint32)
+    ends = rng.integers(0, 8, 60) * 2.0**-149
+
+    def lengthened(rays: Rays) -> Rays:
+        # Of about 2^58: the scene is 2^-148 of that away.
+        return rays[0], (rays[1] / size * length).astype(np.float32)
+
+    apart, common = (
+        lengthened(towards(origins, targets)),
+        lengthened(towards(shared, targets)),
+    )
+    return HardCase(
+        scene,
+        {
+            "from one point": RaySet(common, every_ray_hits=True),
+            "from many": RaySet(apart, every_ray_hits=True),
+            "from one point, with an end": RaySet(common, t_max=ends),
+            "from many, with an end": RaySet(apart, t_max=ends),
         },
     )

@@ -94,26 +94,36 @@ def closed(name: str, vertices: FloatArray, faces: FaceArray) -> ClosedMesh:
     return ClosedMesh(name, places, merged).checked()
 
 
-def winding_numbers(mesh: ClosedMesh, points: FloatArray) -> DoubleArray:
-    """Of points (N, 3); near a whole number, unless a point is on the mesh."""
+def solid_angles(mesh: ClosedMesh, point: FloatArray) -> DoubleArray:
+    """Of all faces, signed, from a point (3,); 2 pi in size for a face that it is on."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)
-    found = np.zeros(len(points))
-    for i, point in enumerate(points.astype(np.float64)):
-        a, b, c = np.moveaxis(corners - point, 1, 0)
-        la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
-        volume = np.einsum("ij,ij->i", a, np.cross(b, c))
-        rest = (
-            la * lb * lc
-            + np.einsum("ij,ij->i", a, b) * lc
-            + np.einsum("ij,ij->i", b, c) * la
-            + np.einsum("ij,ij->i", c, a) * lb
-        )
-        found[i] = np.arctan2(volume, rest).sum() / (2 * np.pi)
-    return found
+    a, b, c = np.moveaxis(corners - point.astype(np.float64), 1, 0)
+    la, lb, lc = (np.linalg.norm(x, axis=1) for x in (a, b, c))
+    volume = np.einsum("ij,ij->i", a, np.cross(b, c))
+    rest = (
+        la * lb * lc
+        + np.einsum("ij,ij->i", a, b) * lc
+        + np.einsum("ij,ij->i", b, c) * la
+        + np.einsum("ij,ij->i", c, a) * lb
+    )
+    angles: DoubleArray = 2 * np.arctan2(volume, rest)
+    return angles
+
+
+def winding_number(angles: DoubleArray) -> float:
+    return float(angles.sum() / (4 * np.pi))
+
+
+def is_inside(angles: DoubleArray) -> bool:
+    """Whether a point is surrounded by the mesh, and so far off all faces that it is not on
+    one: from there a ray may meet that face only, at t = 0."""
+    winding = winding_number(angles)
+    whole = abs(winding - round(winding)) < 1e-3
+    return whole and abs(winding) > 0.5 and float(np.abs(angles).max()) < 1.0
 
 
 def inner_points(mesh: ClosedMesh, rng: np.random.Generator, count: int) -> FloatArray:
-    """Points (count, 3) whose winding number is not zero.
+    """Points (count, 3) that every ray from which meets the mesh.
 
     Candidates are means of points of the mesh, two for each.
     """
@@ -125,9 +135,7 @@ def inner_points(mesh: ClosedMesh, rng: np.random.Generator, count: int) -> Floa
         ends = rng.choice(mesh.vertices, (count, 2)).astype(np.float64)
         share = rng.uniform(0.3, 0.7, (count, 1))
         points = (ends[:, 0] * share + ends[:, 1] * (1 - share)).astype(np.float32)
-        winding = winding_numbers(mesh, points)
-        whole = np.abs(winding - np.round(winding)) < 1e-3
-        inside = points[whole & (np.abs(winding) > 0.5)]
+        inside = points[[is_inside(solid_angles(mesh, point)) for point in points]]
         found.append(inside)
         total += len(inside)
     if total < count:
