@@ -5,15 +5,18 @@
 #include "bind/watch.h"
 #include "embree_frame.h"
 #include "embree_hits.h"
+#include "kernels.h"
 #include "mlrt_engine.h"
 #include "render/camera.h"
 
 #include <bit>
+#include <limits>
 #include <malloc.h>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <optional>
+#include <vector>
 
 namespace nb = nanobind;
 
@@ -132,6 +135,40 @@ void bind_input(nb::module_ &m) {
         .def_ro("cpu", &Seconds::cpu);
 }
 
+Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
+                          const Points &origins, const Points &directions,
+                          const Distances &t, const Numbers &primitives) {
+    const size_t count = origins.shape(0);
+    if (directions.shape(0) != count || t.shape(0) != count || primitives.shape(0) != count)
+        refuse_value("origins, directions, t and primitives must have the same length.");
+    Kernel kernel = Kernel::exact;
+    if (name == "single")
+        kernel = Kernel::single_precision;
+    else if (name == "double")
+        kernel = Kernel::double_precision;
+    else if (name != "exact")
+        refuse_value("kernel must be single, double or exact.");
+    nb::gil_scoped_release release;
+    std::vector<float> columns[6];
+    for (size_t k = 0; k < 6; ++k) {
+        const float *first = (k < 3 ? origins : directions).data() + k % 3;
+        columns[k].resize(count);
+        for (size_t i = 0; i < count; ++i)
+            columns[k][i] = first[3 * i];
+    }
+    const std::vector<float> t_min(count, 0.0f);
+    const std::vector<float> t_max(count, std::numeric_limits<float>::max());
+    RayGroup rays;
+    rays.count = uint32_t(count);
+    for (size_t k = 0; k < 3; ++k) {
+        rays.origin[k] = columns[k].data();
+        rays.direction[k] = columns[k + 3].data();
+    }
+    rays.t_min = t_min.data();
+    rays.t_max = t_max.data();
+    return trace_with(tree.built.tree, kernel, rays, {t.data(), primitives.data()});
+}
+
 void bind_mlrt(nb::module_ &m) {
     nb::class_<TimedTree>(m, "KdTree")
         .def(
@@ -191,7 +228,11 @@ void bind_mlrt(nb::module_ &m) {
                 return counters_to_dict(counters);
             },
             nb::arg("view"), nb::arg("options"),
-            nb::arg("tile") = FrameSettings().tile_side);
+            nb::arg("tile") = FrameSettings().tile_side)
+        .def("trace_with", &trace_with_kernel, nb::arg("kernel"), nb::arg("origins"),
+             nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
+             "Writes the nearest hits of rays by the kernel single, double or exact of "
+             "kernels.h.");
 }
 
 void bind_embree(nb::module_ &m) {

@@ -143,6 +143,30 @@ def make_parser() -> Parser:
     )
     hits.set_defaults(run=run_hits)
     add_study_options(hits, rays=10**6)
+    kernels = commands.add_parser(
+        "kernels",
+        help="exact tests of triangles beside such in single and double precision",
+        description="Traces rays from inside of closed meshes with the same traversal and "
+        "three tests of triangles, and counts leaks, other hits than the exact ones and "
+        "errors of t.",
+    )
+    kernels.set_defaults(run=run_kernels)
+    add_shared_options(kernels, repeats=5)
+    kernels.add_argument(
+        "--rays",
+        type=ray_count,
+        default=2**20,
+        metavar="N",
+        help="of each kind (%(default)s)",
+    )
+    kernels.add_argument(
+        "--subdivisions",
+        type=int,
+        choices=range(1, 11),
+        default=7,
+        metavar="N",
+        help="of the meshes, 1 to 10: 8 * 4**N faces (%(default)s)",
+    )
     offsets = commands.add_parser(
         "offsets",
         help="pixels that shadow rays get wrong, by size of the scene",
@@ -172,6 +196,14 @@ def make_parser() -> Parser:
         help="MLRT's source checkout (the current one)",
     )
     return parser
+
+
+def ray_count(text: str) -> int:
+    limit = 2**28
+    value = int(text) if text.isdecimal() else 0
+    if not 1 <= value <= limit:
+        raise argparse.ArgumentTypeError(f"{text} is not from 1 to {limit}")
+    return value
 
 
 # What the commands need is imported late: a wrong call is answered without loading Mitsuba.
@@ -207,6 +239,12 @@ def run_watertight(options: argparse.Namespace) -> bool:
 
 def run_hits(options: argparse.Namespace) -> bool:
     from .hits_command import run
+
+    return run(options)
+
+
+def run_kernels(options: argparse.Namespace) -> bool:
+    from .kernels_command import run
 
     return run(options)
 

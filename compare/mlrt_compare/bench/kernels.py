@@ -1,0 +1,162 @@
+"""What exactness costs and gives: the same traversal with tests of triangles in single and
+in double precision beside the exact one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from mlrt_plugin import KdTree
+
+from .native import Native
+from .offset_scene import ball
+
+FloatArray = npt.NDArray[np.float32]
+HitArrays = tuple[FloatArray, npt.NDArray[np.int64]]
+"""Distances (N,), inf for a miss, and faces (N,), -1 for one."""
+MISS = 0xFFFFFFFF
+KERNELS = {
+    "single": "single precision",
+    "double": "double precision",
+    "exact": "exact",
+}
+AIMS = ("vertices", "points of edges", "anywhere", "pixels")
+ORIGINS = 64
+"""Points that rays start at; neighbours in a row share one."""
+RUN = 1024
+
+
+@dataclass(frozen=True)
+class Contender:
+    """Called with origins and directions, (N, 3) float32; returns seconds of wall-clock
+    time too."""
+
+    name: str
+    closest_hit: Callable[[FloatArray, FloatArray], tuple[HitArrays, float]]
+
+
+def kernel_contenders(
+    native: Native, vertices: FloatArray, faces: npt.NDArray[np.uint32]
+) -> list[Contender]:
+    """All of them walk the tree of the fast builder in packets of 16 from the root; the
+    last traces as MLRT does by default."""
+    mesh = native.module.Mesh(vertices, faces)
+    tree = native.module.KdTree(mesh, {"builder": "fast"})
+
+    def by_kernel(kernel: str) -> Contender:
+        def closest_hit(o: FloatArray, d: FloatArray) -> tuple[HitArrays, float]:
+            t, face = np.empty(len(o), np.float32), np.empty(len(o), np.uint32)
+            seconds: Any = tree.trace_with(kernel, o, d, t, face)
+            return (t, np.where(face == MISS, -1, face.astype(np.int64))), seconds.wall
+
+        return Contender(KERNELS[kernel], closest_hit)
+
+    own = KdTree(vertices, faces, builder="fast")
+
+    def usual(o: FloatArray, d: FloatArray) -> tuple[HitArrays, float]:
+        start = time.perf_counter()
+        hits = own.closest_hit(o, d)
+        seconds = time.perf_counter() - start
+        return (hits.t, hits.primitive.astype(np.int64)), seconds
+
+    return [*(by_kernel(kernel) for kernel in KERNELS), Contender("MLRT as usual", usual)]
+
+
+@dataclass(frozen=True)
+class ClosedMesh:
+    name: str
+    vertices: FloatArray
+    faces: npt.NDArray[np.uint32]
+    center: npt.NDArray[np.float64]
+
+
+def closed_meshes(subdivisions: int) -> list[ClosedMesh]:
+    """A ball, the same squeezed until its faces are slivers, and one far from the
+    origin."""
+    triangles = ball(np.zeros(3), 1.0, subdivisions)
+    meshes = []
+    for name, factors, center in (
+        ("ball", (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)),
+        ("slivers", (1.0, 1.0, 1e-3), (0.0, 0.0, 0.0)),
+        ("ball at 10^4", (1.0, 1.0, 1.0), (1e4, -1e4, 1e4)),
+    ):
+        corners = (triangles * factors + center).astype(np.float32).reshape(-1, 3)
+        # Corners that are rounded alike are one vertex.
+        vertices, numbers = np.unique(corners, axis=0, return_inverse=True)
+        faces = numbers.reshape(-1, 3).astype(np.uint32)
+        meshes.append(ClosedMesh(name, vertices, faces, np.array(center)))
+    return meshes
+
+
+def rays_inside(
+    mesh: ClosedMesh, aim: str, count: int, seed: int
+) -> tuple[FloatArray, FloatArray]:
+    """Rays from inside, every one of which meets a face: at random, but for those at
+    pixels, which are of a square image in blocks of 4 x 4."""
+    rng = np.random.default_rng(seed)
+    size = 0.2 * np.ptp(mesh.vertices, axis=0)
+    points = mesh.center + rng.uniform(-0.5, 0.5, (ORIGINS, 3)) * size
+    runs = rng.integers(0, ORIGINS, -(-count // RUN))
+    origins = points.astype(np.float32)[np.repeat(runs, RUN)[:count]]
+    if aim == "pixels":
+        return np.repeat(origins[:1], count, axis=0), through_pixels(count)
+    if aim == "anywhere":
+        return origins, rng.normal(size=(count, 3)).astype(np.float32)
+    corners = mesh.vertices[mesh.faces[rng.integers(0, len(mesh.faces), count)]]
+    target = corners[:, 0]
+    if aim == "points of edges":
+        share = rng.uniform(size=(count, 1))
+        target = (target + share * (corners[:, 1].astype(np.float64) - target)).astype("f4")
+    return origins, target - origins
+
+
+def through_pixels(count: int) -> FloatArray:
+    """Directions of a camera that looks along x with 90 degrees of view, row of blocks by
+    row of blocks."""
+    blocks = int(np.ceil(np.sqrt(count / 16)))
+    number = np.arange(count)
+    block, inside = number // 16, number % 16
+    column = block % blocks * 4 + inside % 4
+    row = block // blocks * 4 + inside // 4
+    y, z = ((2 * place + 1) / (4 * blocks) - 1 for place in (column, row))
+    return np.stack([np.ones(count), y, z], axis=1).astype(np.float32)
+
+
+def compare(
+    contenders: list[Contender], origins: FloatArray, directions: FloatArray, repeats: int
+) -> list[dict[str, Any]]:
+    """Leaks, hits that differ from the exact ones, errors of t in units in the last place
+    where the face is the same, and rays a second, the best of some runs in turns."""
+    best = dict.fromkeys((contender.name for contender in contenders), np.inf)
+    found: dict[str, HitArrays] = {}
+    for _ in range(repeats):
+        for contender in contenders:
+            hits, seconds = contender.closest_hit(origins, directions)
+            found[contender.name] = hits
+            best[contender.name] = min(best[contender.name], seconds)
+    exact_t, exact_face = found[KERNELS["exact"]]
+    rows = []
+    for name, (t, face) in found.items():
+        same = (face == exact_face) & (face >= 0)
+        # Positive floats are in the order of their bits.
+        ulps = np.abs(
+            t[same].view(np.int32).astype(np.int64) - exact_t[same].view(np.int32)
+        )
+        rows.append(
+            {
+                "name": name,
+                "rays": len(t),
+                "leaks": int((face < 0).sum()),
+                "other_hits": int((face != exact_face).sum()),
+                "inexact_t": int(np.count_nonzero(ulps)),
+                "ulps_p99": float(np.percentile(ulps, 99)) if len(ulps) else 0.0,
+                "ulps_max": int(ulps.max(initial=0)),
+                "rays_per_second": len(t) / best[name],
+            }
+        )
+    return rows

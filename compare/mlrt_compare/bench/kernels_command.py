@@ -1,0 +1,73 @@
+"""The command `mlrt-bench kernels`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from mlrt_plugin.threads import thread_count
+
+from .checkout import find_checkout
+from .figures import new_figures, show, write_json
+from .kernels import AIMS, closed_meshes, compare, kernel_contenders, rays_inside
+from .machine import machine_record
+from .native import load_native
+from .options import default_cache
+from .status import show_status
+from .table import aligned
+
+SEED = 20261128
+
+
+def run(options: argparse.Namespace) -> bool:
+    """Returns whether nothing leaks through exact tests."""
+    source = find_checkout(options.source)
+    native = load_native(source, options.cache or default_cache())
+    settings = {
+        "rays": options.rays,
+        "repeats": options.repeats,
+        "subdivisions": options.subdivisions,
+        "threads": list(options.threads),
+        "seed": SEED,
+    }
+    figures = new_figures("kernels", machine_record(source, native), settings)
+    leaks = 0
+    for mesh in closed_meshes(options.subdivisions):
+        scene: dict[str, Any] = {"name": mesh.name, "skipped": None, "blocks": []}
+        figures["scenes"].append(scene)
+        for threads in options.threads:
+            with thread_count(threads):
+                contenders = kernel_contenders(native, mesh.vertices, mesh.faces)
+                for aim in AIMS:
+                    show_status(f"{mesh.name}, {aim}, {threads} threads")
+                    rays = rays_inside(mesh, aim, options.rays, SEED)
+                    rows = compare(contenders, *rays, options.repeats)
+                    leaks += sum(
+                        row["leaks"] for row in rows if "precision" not in row["name"]
+                    )
+                    show_status("")
+                    scene["blocks"].append({"aim": aim, "threads": threads, "rows": rows})
+                    title = f"{mesh.name}, {len(mesh.faces)} faces, rays at {aim}"
+                    show(["", f"{title}, {threads} threads:", *lines(rows)])
+        write_json(options.json, figures)
+    return leaks == 0
+
+
+def lines(rows: list[dict[str, Any]]) -> list[str]:
+    table: list[tuple[str, ...]] = [
+        ("test", "rays", "leaks", "other hits", "t inexact", "ulps p99", "max", "Mrays/s")
+    ]
+    for row in rows:
+        table.append(
+            (
+                row["name"],
+                f"{row['rays']:,}",
+                f"{row['leaks']:,}",
+                f"{row['other_hits']:,}",
+                f"{row['inexact_t']:,}",
+                f"{row['ulps_p99']:.0f}",
+                f"{row['ulps_max']:,}",
+                f"{row['rays_per_second'] / 1e6:.2f}",
+            )
+        )
+    return aligned(table)

@@ -1,0 +1,97 @@
+"""mlrt-bench kernels: the tests of triangles find what NumPy does, and only exact ones find
+all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bench_command import assert_one_sentence, command
+from mlrt_compare.bench.kernels import (
+    AIMS,
+    closed_meshes,
+    compare,
+    kernel_contenders,
+    rays_inside,
+)
+from mlrt_compare.bench.native import Native
+
+SEED = 20261128
+NAMES = ["single precision", "double precision", "exact", "MLRT as usual"]
+
+
+def test_hits_are_those_of_numpy(native: Native) -> None:
+    """Möller and Trumbore in double precision, of rays at no edge."""
+    mesh = closed_meshes(2)[0]
+    origins, directions = rays_inside(mesh, "anywhere", 500, SEED)
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    a, e1, e2 = (
+        corners[:, 0],
+        corners[:, 1] - corners[:, 0],
+        corners[:, 2] - corners[:, 0],
+    )
+    d = directions.astype(np.float64)[:, None]
+    p = np.cross(d, e2)
+    determinant = (p * e1).sum(axis=2)
+    s = origins.astype(np.float64)[:, None] - a
+    q = np.cross(s, e1[None])
+    u, v = (s * p).sum(axis=2) / determinant, (q * d).sum(axis=2) / determinant
+    t = (q * e2).sum(axis=2) / determinant
+    t = np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0), t, np.inf)
+    nearest = t.argmin(axis=1)
+    for contender in kernel_contenders(native, mesh.vertices, mesh.faces):
+        (found_t, face), seconds = contender.closest_hit(origins, directions)
+        assert seconds > 0
+        np.testing.assert_array_equal(face, nearest)
+        tolerance = 1e-5 if contender.name == "single precision" else 1e-7
+        np.testing.assert_allclose(found_t, t.min(axis=1), rtol=tolerance)
+
+
+@pytest.mark.parametrize("aim", AIMS)
+def test_only_exact_tests_find_all(native: Native, aim: str) -> None:
+    leaks = dict.fromkeys(NAMES, 0)
+    for mesh in closed_meshes(3):
+        contenders = kernel_contenders(native, mesh.vertices, mesh.faces)
+        rows = compare(contenders, *rays_inside(mesh, aim, 4000, SEED), 1)
+        assert [row["name"] for row in rows] == NAMES
+        for row in rows:
+            leaks[row["name"]] += row["leaks"]
+        assert (rows[3]["other_hits"], rows[3]["inexact_t"]) == (0, 0)
+    assert leaks["exact"] == leaks["MLRT as usual"] == 0
+    if aim == "vertices":
+        assert leaks["single precision"] > 100
+
+
+def test_the_command_tells_and_keeps_it(
+    native: Native, cache: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "kernels.json"
+    child = command(
+        "kernels", "--rays", 2000, "--subdivisions", 2, "--threads", 1, "--repeats", 1,
+        "--cache", cache, "--json", file,
+    )  # fmt: skip
+    assert child.returncode == 0, child.stderr
+    assert "ball, 128 faces, rays at vertices, 1 threads:" in child.stdout
+    figures = json.loads(file.read_text())
+    assert [scene["name"] for scene in figures["scenes"]] == [
+        "ball",
+        "slivers",
+        "ball at 10^4",
+    ]
+    for scene in figures["scenes"]:
+        assert [block["aim"] for block in scene["blocks"]] == list(AIMS)
+
+
+def test_what_the_native_side_refuses(native: Native) -> None:
+    mesh = closed_meshes(1)[0]
+    module = native.module
+    tree = module.KdTree(module.Mesh(mesh.vertices, mesh.faces), {})
+    rays = np.ones((4, 3), np.float32)
+    t, face = np.empty(4, np.float32), np.empty(4, np.uint32)
+    with pytest.raises(ValueError, match="kernel must be single, double or exact"):
+        tree.trace_with("half", rays, rays, t, face)
+    with pytest.raises(ValueError, match="the same length"):
+        tree.trace_with("exact", rays, rays[:3], t, face)
+    assert_one_sentence(command("kernels", "--rays", "0"), "0 is not from 1 to")
