@@ -26,7 +26,7 @@ def scene_hash(settings: Settings) -> str:
     parsed = parse_file(settings.scene, settings.defines)
     digest = hashlib.sha256(repr((settings.sensor, settings.resolution)).encode())
     numbers = {id(element): number for number, element in enumerate(parsed.elements)}
-    with resolving_from(settings.scene.parent):
+    with resolving_from(parsed.folder):
         for element in parsed.elements:
             digest.update(repr((element.kind, element.plugin, element.id)).encode())
             for name, child in element.children:
