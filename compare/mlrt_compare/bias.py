@@ -1,9 +1,11 @@
-"""Tests whether two renderers have the same expected image.
+"""Tests whether two renderers have the same expected image, and the same noise.
 
 Welch's t-test on the means of tiles, as Jung, Hanika and Dachsbacher propose (Detecting
 Bias in Monte Carlo Renderers using Welch's t-test, JCGT 9(2), 2020): without bias the
 p-values of the tiles are uniformly distributed, and a small bias shows in their histogram
-before any pixel betrays it.
+before any pixel betrays it. The same test of the distances from the tile's median tells
+whether the noise is the same (Brown and Forsythe, Robust Tests for the Equality of
+Variances, 1974), which an F-test would tell of normal distributions only.
 """
 
 from __future__ import annotations
@@ -40,6 +42,11 @@ class BiasTest:
     """Mean of the first over that of the second, minus 1."""
     interval: tuple[float, float]
     """99 % confidence interval of it."""
+    spread_smallest_p: float
+    """The same as ``smallest_p`` of the noise of the tiles."""
+    variance_ratio: float
+    """Variance of the tiles' means, all together, of the first over that of the second; 1
+    without noise."""
     histogram: tuple[int, ...]
     """Numbers of tiles by p-value, from 0 to 1 in equal steps."""
 
@@ -48,8 +55,9 @@ class BiasTest:
         return not self.reasons()
 
     def reasons(self) -> list[str]:
-        """What speaks for a bias, a phrase each; three tests share the significance."""
-        level = 1 - (1 - SIGNIFICANCE) ** (1 / 3)
+        """What speaks for a difference, a phrase each; four tests share the
+        significance."""
+        level = 1 - (1 - SIGNIFICANCE) ** (1 / 4)
         found = []
         if self.smallest_p < level:
             found.append(f"a tile differs (p = {self.smallest_p:.2g} for all together)")
@@ -60,6 +68,11 @@ class BiasTest:
         if self.mean_p < level:
             found.append(
                 f"the means differ by {100 * self.relative:.3g} % (p = {self.mean_p:.2g})"
+            )
+        if self.spread_smallest_p < level:
+            found.append(
+                "the noise of a tile differs "
+                f"(p = {self.spread_smallest_p:.2g} for all together)"
             )
         return found
 
@@ -72,6 +85,8 @@ class BiasTest:
             "mean_p": self.mean_p,
             "relative_difference": self.relative,
             "relative_interval_99": list(self.interval),
+            "spread_smallest_p": self.spread_smallest_p,
+            "variance_ratio": self.variance_ratio,
             "p_histogram": list(self.histogram),
             "passed": self.passed,
             "reasons": self.reasons(),
@@ -98,17 +113,26 @@ def bias_test(first: NDArray[np.float64], second: NDArray[np.float64]) -> BiasTe
             else 0.0
         )
     tested = p[noisy]
-    smallest = float(np.min(tested, initial=1.0))
+    distances = [np.abs(tiles - np.median(tiles, axis=0)) for tiles in (first, second)]
+    spread_p = welch(*distances)[0][noisy]
+    variances = [float(np.sum(np.var(tiles, axis=0))) for tiles in (first, second)]
     return BiasTest(
         tiles=int(np.count_nonzero(noisy)),
         differing_without_noise=int(np.count_nonzero(differing)),
-        smallest_p=float(1 - (1 - smallest) ** max(len(tested), 1)),
+        smallest_p=smallest_of_all(tested),
         uniform_p=float(kstest(tested, "uniform").pvalue) if len(tested) else 1.0,
         mean_p=mean_p,
         relative=difference / scale,
         interval=((difference - half) / scale, (difference + half) / scale),
+        spread_smallest_p=smallest_of_all(spread_p),
+        variance_ratio=variances[0] / variances[1] if variances[1] > 0 else 1.0,
         histogram=tuple(map(int, np.histogram(tested, BINS, (0, 1))[0])),
     )
+
+
+def smallest_of_all(p: NDArray[np.float64]) -> float:
+    """The smallest p-value of independent tests, corrected by Sidak for their number."""
+    return float(1 - (1 - np.min(p, initial=1.0)) ** max(p.size, 1))
 
 
 def welch(

@@ -60,7 +60,7 @@ def compare_images(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
-def test_pixels(arguments: Sequence[str]) -> int:
+def judge_pixels(arguments: Sequence[str]) -> int:
     from .ztest_command import run
 
     return run(arguments)
@@ -81,7 +81,7 @@ def sweep_scenes(arguments: Sequence[str]) -> int:
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
-    "ztest": test_pixels,
+    "ztest": judge_pixels,
     "speed-error": speed_and_error,
     "sweep": sweep_scenes,
 }

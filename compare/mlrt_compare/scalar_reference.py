@@ -12,7 +12,13 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from .exr_files import COLOUR, check_comparable, check_finite_reference, read_exr
+from .exr_files import (
+    COLOUR,
+    check_comparable,
+    check_finite_reference,
+    common_channels,
+    read_exr,
+)
 from .mitsuba_scene import load_mitsuba_scene
 from .reference_cache import ReferenceCache
 from .scene_hash import scene_hash
@@ -63,6 +69,7 @@ def reference_of_files(mean: Path, variance: Path) -> Reference:
     images = read_exr(mean), read_exr(variance)
     check_comparable(images[1], images[0])
     for image in images:
+        common_channels(image, image, COLOUR)
         check_finite_reference(image, COLOUR)
     return Reference(
         to_xyz(images[0].stack(COLOUR)),

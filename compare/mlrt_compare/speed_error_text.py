@@ -95,7 +95,9 @@ def markdown(figures: dict[str, Any]) -> str:
         f"{reference['mse_between']:.2e}. Bias by Welch's t-test: {bias['tiles']} tiles, "
         f"smallest p {bias['smallest_p']:.2g} for all together, uniform with p "
         f"{bias['uniform_p']:.2g}, means with p {bias['mean_p']:.2g}; MLRT's mean is "
-        f"{100 * low:+.4f} % to {100 * high:+.4f} % from Mitsuba's (99 %).",
+        f"{100 * low:+.4f} % to {100 * high:+.4f} % from Mitsuba's (99 %). The noise of "
+        f"the tiles has the same variance with p {bias['spread_smallest_p']:.2g}; over "
+        f"all, MLRT's is {bias['variance_ratio']:.3f} times Mitsuba's.",
     ]
     even = figures["break_even_frames"]
     lines += [

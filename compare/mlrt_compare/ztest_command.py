@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .options import (
     COULD_NOT_RUN,
@@ -26,11 +28,53 @@ from .options import (
 )
 from .settings import Settings
 
+if TYPE_CHECKING:
+    from .scalar_reference import Reference
+    from .ztest import ZTest
+
 SAMPLE_BUDGET = 2_000_000
 """Samples of an image that is tested, as in Mitsuba's own tests."""
 REFERENCE_FACTOR = 64
 """Samples of a reference over those of the image: its noise then adds less than 1 % to the
 standard score."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """An image and what the test says of it, or why it could not be tested."""
+
+    name: str
+    test: ZTest | None = None
+    reference: Reference | None = None
+    error: str = ""
+
+    @property
+    def code(self) -> int:
+        """The exit code for this image: the rule of Mitsuba's tests decides."""
+        if self.test is None:
+            return COULD_NOT_RUN
+        return PASSED if self.test.pixels_pass else FAILED
+
+    def text(self) -> str:
+        test, reference = self.test, self.reference
+        if test is None or reference is None:
+            return f"{self.name}: {self.error}"
+        known = f", {reference.spp:.0f} spp" if math.isfinite(reference.spp) else ""
+        return (
+            f"{'PASS' if test.pixels_pass else 'FAIL'} {self.name}: "
+            f"{100 * test.passing:.4f} % of the pixels' channels pass, smallest p "
+            f"{test.smallest_p:.2g} at alpha {test.alpha:.2g}, of the mean "
+            f"{test.mean_p:.2g}; {test.spp} spp against {reference.source}{known}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """All figures; JSON has None for those that are not finite."""
+        figures: dict[str, Any] = {"name": self.name, "code": self.code}
+        if self.test is None or self.reference is None:
+            return {**figures, "error": self.error}
+        figures["reference"] = self.reference.source
+        figures["reference_spp"] = self.reference.spp
+        return {**figures, **self.test.as_dict()}
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -42,23 +86,21 @@ def run(arguments: Sequence[str]) -> int:
     check_json(options.json)
     images = [path for path in options.inputs if path.suffix.lower() == ".exr"]
     if not images:
-        tested = test_scenes(options)
+        judged = judge_scenes(options)
     elif len(images) == len(options.inputs) == 3:
-        tested = [test_images(options)]
+        judged = [judge_images(options)]
     else:
         raise CannotRun(
             "name scenes, or three EXR files: the image, the reference and the variance of "
             "a sample"
         )
     if options.output is not None:
-        write_p_maps(tested, options.output)
-    for figures in tested:
-        figures.pop("test", None)
-    write_json(options.json, tested)
-    return max(int(figures["code"]) for figures in tested)
+        write_p_maps(judged, options.output)
+    write_json(options.json, [one.as_dict() for one in judged])
+    return max(one.code for one in judged)
 
 
-def test_images(options: argparse.Namespace) -> dict[str, Any]:
+def judge_images(options: argparse.Namespace) -> Judged:
     """Tests an EXR file. Raises CannotRun."""
     if options.spp is None:
         raise CannotRun("tell how many samples a pixel the image has: --spp N")
@@ -68,16 +110,15 @@ def test_images(options: argparse.Namespace) -> dict[str, Any]:
 
     image, expected = read_exr(options.inputs[0]), read_exr(options.inputs[1])
     check_comparable(image, expected)
-    for one in (image, expected):
-        common_channels(one, one, COLOUR)
+    common_channels(image, image, COLOUR)
     reference = reference_of_files(*options.inputs[1:])
     test = z_test(
         to_xyz(image.stack(COLOUR)), reference.mean, reference.variance, options.spp
     )
-    return told(str(options.inputs[0]), test, reference)
+    return told(Judged(str(options.inputs[0]), test, reference))
 
 
-def test_scenes(options: argparse.Namespace) -> list[dict[str, Any]]:
+def judge_scenes(options: argparse.Namespace) -> list[Judged]:
     """Renders and tests each scene; one that cannot be rendered does not stop the
     others."""
     from mlrt_plugin.errors import MlrtError
@@ -85,14 +126,14 @@ def test_scenes(options: argparse.Namespace) -> list[dict[str, Any]]:
     found = []
     for scene in options.inputs:
         try:
-            found.append(test_scene(settings_of(options, scene, options.spp), options))
+            found.append(judge_scene(settings_of(options, scene, options.spp), options))
         except (MlrtError, CannotRun) as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
-            found.append({"name": str(scene), "code": COULD_NOT_RUN, "error": str(error)})
+            found.append(Judged(str(scene), error=str(error)))
     return found
 
 
-def test_scene(settings: Settings, options: argparse.Namespace) -> dict[str, Any]:
+def judge_scene(settings: Settings, options: argparse.Namespace) -> Judged:
     """Renders a scene by MLRT and holds it against a reference that is stored, kept or
     rendered. Raises MlrtError or CannotRun."""
     from mlrt_plugin.progress import ProgressBar
@@ -132,7 +173,7 @@ def test_scene(settings: Settings, options: argparse.Namespace) -> dict[str, Any
             f"the image {image.shape}"
         )
     test = z_test(to_xyz(image), reference.mean, reference.variance, spp)
-    return told(str(settings.scene), test, reference)
+    return told(Judged(str(settings.scene), test, reference))
 
 
 def warnings_of_filter(settings: Settings) -> list[str]:
@@ -152,27 +193,13 @@ def warnings_of_filter(settings: Settings) -> list[str]:
     ]
 
 
-def told(name: str, test: Any, reference: Any) -> dict[str, Any]:
-    """Prints what a test says, and returns it with the test itself."""
-    code = PASSED if test.pixels_pass else FAILED
-    known = "" if reference.spp == float("inf") else f", {reference.spp:.0f} spp"
-    print(
-        f"{'PASS' if code == PASSED else 'FAIL'} {name}: {100 * test.passing:.4f} % of the "
-        f"pixels' channels pass, smallest p {test.smallest_p:.2g} at alpha "
-        f"{test.alpha:.2g}, of the mean {test.mean_p:.2g}; "
-        f"{test.spp} spp against {reference.source}{known}"
-    )
-    return {
-        "name": name,
-        "code": code,
-        "reference": reference.source,
-        "reference_spp": reference.spp,
-        **test.as_dict(),
-        "test": test,
-    }
+def told(judged: Judged) -> Judged:
+    """Prints what a test says, and returns it."""
+    print(judged.text())
+    return judged
 
 
-def write_p_maps(tested: Sequence[dict[str, Any]], folder: Path) -> None:
+def write_p_maps(judged: Sequence[Judged], folder: Path) -> None:
     """Writes STEM-p.png for each image that was tested; all or none."""
     from PIL import Image as Pillow
 
@@ -180,15 +207,19 @@ def write_p_maps(tested: Sequence[dict[str, Any]], folder: Path) -> None:
 
     folder.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder, prefix=".mlrt-compare-") as temporary:
-        names = []
-        for figures in tested:
-            if "test" in figures:
-                test = figures["test"]
-                names.append(f"{Path(figures['name']).stem}-p.png")
-                picture = Pillow.fromarray(p_map(test.p_values, test.alpha))
-                picture.save(Path(temporary) / names[-1])
-        for name in names:
-            print(f"wrote {(Path(temporary) / name).replace(folder / name)}")
+        unfinished: list[Path] = []
+        for one in judged:
+            if one.test is not None:
+                stem = Path(one.name).stem
+                path = Path(temporary) / f"{stem}-p.png"
+                # Scenes in folders of their own are often called alike.
+                if path in unfinished:
+                    path = path.with_name(f"{stem}-{len(unfinished) + 1}-p.png")
+                picture = p_map(one.test.p_values, one.test.alpha)
+                Pillow.fromarray(picture).save(path)
+                unfinished.append(path)
+        for path in unfinished:
+            print(f"wrote {path.replace(folder / path.name)}")
 
 
 def ztest_parser() -> argparse.ArgumentParser:

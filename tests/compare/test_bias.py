@@ -58,6 +58,17 @@ def test_a_bias_of_one_tile_is_found_there() -> None:
     assert sum(test.histogram) == test.tiles == TILES[0] * TILES[1]
 
 
+def test_more_noise_of_one_tile_is_found_there() -> None:
+    generator = np.random.default_rng(SEED)
+    first, second = renders(generator), renders(generator)
+    first[:, 3, 4] = 1 + 4 * (first[:, 3, 4] - 1)
+    test = bias_test(first, second)
+    assert test.spread_smallest_p < 1e-3 and not test.passed
+    assert test.smallest_p > 0.01, "the means are the same"
+    # One tile of 108 has 16 times the variance.
+    assert test.variance_ratio == pytest.approx((107 + 16) / 108, rel=0.1)
+
+
 def test_tiles_without_noise() -> None:
     same = np.ones((BATCHES, *TILES))
     assert bias_test(same, same).passed

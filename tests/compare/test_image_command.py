@@ -155,6 +155,8 @@ def bad_inputs(folder: Path) -> dict[str, tuple[tuple[object, ...], str]]:
     broken = exr_images.picture(SEED)
     broken[7, 9, 1] = np.nan
     nan = exr_images.write_exr(folder / "nan.exr", broken)
+    broken[7, 9, 1] = -np.inf
+    infinite = exr_images.write_exr(folder / "infinite.exr", broken)
     text = folder / "text.exr"
     text.write_text("not an image")
     cuts = []
@@ -172,6 +174,7 @@ def bad_inputs(folder: Path) -> dict[str, tuple[tuple[object, ...], str]]:
         **{path.stem: ((path, right), "may be damaged") for path in cuts},
         "no file": ((folder / "none.exr", right), "none.exr does not exist"),
         "nan in the reference": ((right, nan), "column 9, row 7"),
+        "infinity in the reference": ((right, infinite), "nan or infinite"),
         "empty folder": ((empty, empty), "holds no EXR image"),
         "folder and file": ((empty, right), "is a folder and the other is not"),
         "no reference": ((right,), "REFERENCE"),

@@ -55,6 +55,14 @@ def test_no_colour_no_metrics_of_it() -> None:
     assert not figures.colour and set(figures.metrics.values()) == {None}
 
 
+def test_luminance_alone_is_a_colour() -> None:
+    reference = exr_images.picture(SEED)[..., 0]
+    figures = image_figures(exr(Y=1.1 * reference), exr(Y=reference), ["Y"])
+    assert figures.colour == ("Y",)
+    assert figures.metrics["energy"] == pytest.approx(0.1, rel=1e-6)
+    assert None not in figures.metrics.values()
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_what_is_not_finite_is_counted_and_spoils_every_metric(bad: float) -> None:
     reference = np.full((16, 16), 0.5)

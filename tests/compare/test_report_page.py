@@ -37,12 +37,12 @@ def images() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return first, second, cost
 
 
-def comparison(scene: str = "a <script> & b.xml") -> Comparison:
+def comparison(*, with_cost: bool = True) -> Comparison:
     mi.set_variant("scalar_rgb")
     first, second, cost = images()
     timings = Timings(0.5, 0.25, 1.5, (1.0, 1.0), kernels_compiled=3, kernels_from_disk=2)
     return Comparison(
-        settings=Settings(Path(scene), defines={"key": "value"}),
+        settings=Settings(Path("a <script> & b.xml"), defines={"key": "value"}),
         spp=4,
         threads=2,
         llvm="20.1.0",
@@ -50,7 +50,7 @@ def comparison(scene: str = "a <script> & b.xml") -> Comparison:
         mitsuba=Side("theirs", second, timings),
         verdict=judge(first, second),
         warnings=("a warning",),
-        cost=cost,
+        cost=cost if with_cost else None,
     )
 
 
@@ -236,6 +236,18 @@ def test_cost_and_zoom(page: Any) -> None:
     )
     page.locator("#zoom-fit").click()
     assert float(page.evaluate("document.body.dataset.zoom")) == pytest.approx(fitted)
+
+
+def test_without_cost_there_is_no_map_of_it(browser: Any, tmp_path: Path) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(report_page(comparison(with_cost=False), MACHINE, None))
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    page.wait_for_selector("body[data-ready='true']")
+    page.keyboard.press("c")
+    assert page.evaluate("document.body.dataset.view") == "first"
+    assert page.locator("#views button").count() == 4
+    page.close()
 
 
 def test_timings_and_tables_are_told(page: Any) -> None:

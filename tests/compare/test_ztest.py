@@ -23,6 +23,14 @@ def test_p_by_hand() -> None:
     assert test.p_values[0, 0, 0] == 1
 
 
+def test_one_channel_is_enough() -> None:
+    reference = np.ones((24, 32, 1))
+    test = z_test(reference + 0.1, reference, np.full_like(reference, 0.04), 16)
+    assert test.smallest_p == pytest.approx(math.erfc(2 / math.sqrt(2)), rel=1e-9)
+    expected = 2 * math.sqrt(24 * 32)  # less what counts as rounding
+    assert test.mean_z == (pytest.approx(expected, rel=1e-4),)
+
+
 def test_noise_of_the_reference_counts_if_it_is_told() -> None:
     reference = np.ones(SHAPE)
     image = reference + 0.1

@@ -8,6 +8,7 @@ from pathlib import Path
 import exr_images
 import mitsuba as mi
 import numpy as np
+import OpenEXR
 import pytest
 import repository
 from mlrt_compare.cli import main
@@ -107,6 +108,26 @@ def test_files_are_tested_with_the_samples_told(tmp_path: Path) -> None:
     # Half a standard deviation of a sample: nothing for one, 5 deviations for 100.
     assert run(*files, "--spp", 1) == 0
     assert run(*files, "--spp", 100) == 2
+
+
+def test_a_variance_without_colour_is_one_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    image = exr_images.write_exr(tmp_path / "image.exr", exr_images.picture(SEED))
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    gray = {"Y": np.ones((48, 64), np.float32)}
+    OpenEXR.File(header, gray).write(str(tmp_path / "var.exr"))
+    assert run(image, image, tmp_path / "var.exr", "--spp", 1) == 4
+    assert "var.exr lacks the channels R, G, B" in capsys.readouterr().err
+
+
+def test_maps_of_scenes_with_the_same_name_are_kept_apart(tmp_path: Path) -> None:
+    copy = tmp_path / SCENE.name
+    copy.write_text(SCENE.read_text())
+    options = (*SMALL, "--cache", tmp_path / "cache", "-o", tmp_path / "maps")
+    assert run(SCENE, copy, *options) == 0
+    names = sorted(path.name for path in (tmp_path / "maps").iterdir())
+    assert names == ["cornell-box-2-p.png", "cornell-box-p.png"]
 
 
 def test_one_that_cannot_be_tested_does_not_stop_the_others(
