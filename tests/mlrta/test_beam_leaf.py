@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
-from tracing import BRUTE_FORCE, Options, build, closest, each_core, occluded
+from tracing import BRUTE_FORCE, Options, build, closest, each_core, interval, occluded
 
 SEED = 20261127
 FloatArray = npt.NDArray[np.float32]
@@ -269,3 +269,8 @@ def test_few_rays_among_many_triangles(core: ModuleType) -> None:
     expected = closest(tree, rays, BRUTE_FORCE)
     closest(tree, rays, ADAPTIVE).assert_same(expected)
     assert np.array_equal(occluded(tree, rays, ADAPTIVE), expected.face >= 0)
+    for options, given_up in ((ADAPTIVE, True), (BEAM_LEAF, False)):
+        counters: dict[str, int] = {}
+        tree.closest_hit(*rays, *interval(rays, 0, np.inf), options, counters)
+        assert counters["beams"] > 0
+        assert (counters["fallbacks"] > 0) == given_up
