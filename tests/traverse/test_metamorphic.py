@@ -22,7 +22,7 @@ from mlrt_plugin.threads import thread_count
 
 ways = st.sampled_from(sorted(WAYS))
 builders = st.sampled_from(sorted(BUILDERS))
-each = settings(max_examples=150, deadline=None)
+each = settings(max_examples=100, deadline=None)
 
 
 def hits(case: Traced, way: str, builder: str, **ends: Any) -> Hits:
