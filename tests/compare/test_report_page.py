@@ -44,6 +44,7 @@ def comparison(*, with_cost: bool = True) -> Comparison:
     return Comparison(
         settings=Settings(Path("a <script> & b.xml"), defines={"key": "value"}),
         spp=4,
+        shading="native",
         threads=2,
         llvm="20.1.0",
         mlrt=Side("ours", first, Timings(0.5, 0.125, 0.75, (0.5, 0.5))),
