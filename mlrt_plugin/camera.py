@@ -11,10 +11,13 @@ import numpy as np
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
+from .features import FILTERS
 from .scene_arrays import Camera, Film
 
 LARGEST_RADIUS = 64
 """Pixels that a reconstruction filter may reach; chosen, far above any in use."""
+USUAL_MITCHELL = "B=0.333333, C=0.333333"
+"""In the description of a filter with the parameters of the paper."""
 BYTES_PER_PIXEL = 64
 """Of colours and AOVs, twice each while they are summed up; measured."""
 
@@ -53,9 +56,15 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
     crop_x, crop_y = (int(n) for n in film.crop_offset())
     rfilter = film.rfilter()
     kind = objects.plugin_name(rfilter)
-    if kind not in ("box", "gaussian"):
+    if kind not in FILTERS:
         raise UnsupportedFeature(
-            f"rfilter '{kind}' of {name} is not supported: only box and gaussian are so far"
+            f"rfilter '{kind}' of {name} is not supported: only {', '.join(FILTERS)} are "
+            "so far"
+        )
+    if kind == "mitchell" and USUAL_MITCHELL not in str(rfilter):
+        raise UnsupportedFeature(
+            f"rfilter 'mitchell' of {name} is not supported: only its usual parameters B "
+            "and C are so far"
         )
     radius = float(rfilter.radius())
     if not 0 < radius <= LARGEST_RADIUS:
@@ -78,7 +87,7 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
             filter=kind,
             filter_radius=0.5 if kind == "box" else radius,
             # Mitsuba cuts its Gaussian off at four standard deviations (gaussian.cpp).
-            filter_stddev=0.5 if kind == "box" else radius / 4,
+            filter_stddev=radius / 4 if kind == "gaussian" else 0.5,
             sample_border=bool(film.sample_border()),
         ),
         warnings,

@@ -13,7 +13,7 @@ BSDFS = ("diffuse", "twosided")
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)
 FILMS = ("hdrfilm",)
-FILTERS = ("box", "gaussian")
+FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent",)
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
 
@@ -68,6 +68,8 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
+        return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
         child.plugin != "diffuse" for child in element.children_of("bsdf")
     ):

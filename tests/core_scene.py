@@ -53,7 +53,7 @@ def film_of(film: Any, description: dict[str, Any]) -> dict[str, Any]:
         "crop_y": int(film.crop_offset()[1]),
         "crop_width": int(film.crop_size()[0]),
         "crop_height": int(film.crop_size()[1]),
-        "filter": "box" if rfilter.is_box_filter() else "gaussian",
+        "filter": description["rfilter"]["type"],
         "filter_radius": float(rfilter.radius()),
         "filter_stddev": float(description["rfilter"].get("stddev", 0.5)),
         "sample_border": bool(description.get("sample_border", False)),

@@ -248,6 +248,12 @@ SCENES: Mapping[str, Callable[[Path], SceneDict]] = {
     "gaussian": lambda folder: room(
         folder, light=rectangle_light(), sensor=sensor(film(70, 45, "gaussian"))
     ),
+    **{
+        name: lambda folder, name=name: room(
+            folder, light=rectangle_light(), sensor=sensor(film(41, 30, name))
+        )
+        for name in ("tent", "mitchell", "catmullrom", "lanczos")
+    },
     "gaussian border": lambda folder: room(
         folder,
         light=rectangle_light(),

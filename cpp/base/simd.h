@@ -115,6 +115,10 @@ inline FloatPacket arc_cosine(const FloatPacket &a) {
     return drjit::acos(a);
 }
 
+inline FloatPacket sine(const FloatPacket &a) {
+    return drjit::sin(a);
+}
+
 // a * b + c, rounded once: every processor we build for has it as an instruction.
 template <typename T>
 T fused(const T &a, const T &b, const T &c) {

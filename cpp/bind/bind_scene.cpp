@@ -231,13 +231,19 @@ Film film_from(nb::handle dict) {
     film.crop_y = fields.integer_or("crop_y", 0, MAX_SIDE);
     film.crop_width = fields.integer_or("crop_width", film.width, MAX_SIDE);
     film.crop_height = fields.integer_or("crop_height", film.height, MAX_SIDE);
-    film.filter = fields.choice<FilterType>(
-        "filter", {{"box", FilterType::box}, {"gaussian", FilterType::gaussian}});
-    const bool box = film.filter == FilterType::box;
-    film.filter_radius =
-        box ? fields.number("filter_radius", 0.5f) : fields.number("filter_radius");
-    film.filter_stddev =
-        box ? fields.number("filter_stddev", 0.5f) : fields.number("filter_stddev");
+    film.filter =
+        fields.choice<FilterType>("filter", {{"box", FilterType::box},
+                                             {"tent", FilterType::tent},
+                                             {"gaussian", FilterType::gaussian},
+                                             {"mitchell", FilterType::mitchell},
+                                             {"catmullrom", FilterType::catmullrom},
+                                             {"lanczos", FilterType::lanczos}});
+    film.filter_radius = film.filter == FilterType::box
+                             ? fields.number("filter_radius", 0.5f)
+                             : fields.number("filter_radius");
+    film.filter_stddev = film.filter == FilterType::gaussian
+                             ? fields.number("filter_stddev")
+                             : fields.number("filter_stddev", 0.5f);
     film.sample_border = fields.boolean("sample_border", false);
     fields.finish();
     if (film.crop_width == 0 || film.crop_height == 0 ||

@@ -58,14 +58,14 @@ struct Camera {
     Vec2f principal_point_offset{};           // in fractions of the film
 };
 
-enum class FilterType : uint32_t { box, gaussian };
+enum class FilterType : uint32_t { box, tent, gaussian, mitchell, catmullrom, lanczos };
 
 struct Film {
     uint32_t width = 1, height = 1; // pixels of the whole film
     uint32_t crop_x = 0, crop_y = 0;
     uint32_t crop_width = 1, crop_height = 1; // the part that is rendered
     FilterType filter = FilterType::box;
-    float filter_radius = 0.5f; // pixels
+    float filter_radius = 0.5f; // pixels; lanczos: also the number of its lobes
     float filter_stddev = 0.5f; // gaussian: pixels
     bool sample_border = false; // also sample a border of the filter's radius
 };

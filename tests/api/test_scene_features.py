@@ -59,7 +59,12 @@ UNSUPPORTED = {
         "</shape>"
     },
     "thinlens": {"sensor": scene_files.SENSOR.replace("perspective", "thinlens")},
-    "tent": {"sensor": scene_files.SENSOR.replace('"box"', '"tent"')},
+    "mitchell": {
+        "sensor": scene_files.SENSOR.replace(
+            '<rfilter type="box"/>',
+            '<rfilter type="mitchell"><float name="B" value="0.5"/></rfilter>',
+        )
+    },
     "homogeneous": {
         "shapes": '<shape type="cube"><medium type="homogeneous" name="interior"/></shape>'
     },

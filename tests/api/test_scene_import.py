@@ -244,6 +244,15 @@ def test_gaussian_filter(
         assert float(reference.eval(x)) == pytest.approx(value, abs=2e-3)
 
 
+@pytest.mark.parametrize("name", ["tent", "mitchell", "catmullrom", "lanczos"])
+def test_other_filters(scene_file: SceneFile, name: str, scalar_variant: None) -> None:
+    film = scene_files.FILM.replace('"box"', f'"{name}"')
+    path = scene_file(sensor=f'<sensor type="perspective">{film}</sensor>')
+    read = import_scene(path).film
+    reference = mi.load_file(str(path)).sensors()[0].film().rfilter()
+    assert (read.filter, read.filter_radius) == (name, reference.radius())
+
+
 def test_arrays_cannot_be_changed(scene_file: SceneFile) -> None:
     scene = import_scene(scene_file())
     for array in (scene.vertices, scene.faces, scene.normals, scene.materials):

@@ -37,12 +37,43 @@ def test_weights_of_the_gaussian(stddev: float) -> None:
     assert weights[200] == pytest.approx(1, abs=1e-3)
 
 
+OTHERS = [
+    {"type": "tent"},
+    {"type": "tent", "radius": 1.7},
+    {"type": "mitchell"},
+    {"type": "catmullrom"},
+    {"type": "lanczos"},
+    {"type": "lanczos", "lobes": 2},
+]
+
+
+def film_with(rfilter: dict[str, Any], **more: Any) -> dict[str, Any]:
+    if rfilter["type"] == "gaussian":
+        return gaussian(rfilter["stddev"], **more)
+    radius = mi.load_dict(rfilter).radius()
+    return film(filter=rfilter["type"], filter_radius=radius, **more)
+
+
+@pytest.mark.parametrize("rfilter", OTHERS, ids=str)
+def test_weights_of_other_filters(rfilter: dict[str, Any]) -> None:
+    theirs = mi.load_dict(rfilter)
+    radius = float(theirs.radius())
+    distances = np.linspace(-radius, radius, 401, dtype=np.float32)
+    weights = core.render_selftest.filter_weights(film_with(rfilter), distances.tolist())
+    np.testing.assert_allclose(weights, [theirs.eval(x) for x in distances], atol=1e-6)
+    beyond = [-radius - 0.01, radius + 0.01]
+    assert not np.any(core.render_selftest.filter_weights(film_with(rfilter), beyond))
+
+
 @pytest.mark.parametrize("samples_per_pixel", [1, 4])
-@pytest.mark.parametrize("stddev", STDDEVS)
+@pytest.mark.parametrize(
+    "rfilter", [*({"type": "gaussian", "stddev": s} for s in STDDEVS), *OTHERS], ids=str
+)
 def test_sums_equal_those_of_an_image_block(
-    mitsuba_llvm: MitsubaWorker, stddev: float, samples_per_pixel: int
+    mitsuba_llvm: MitsubaWorker, rfilter: dict[str, Any], samples_per_pixel: int
 ) -> None:
-    own_film = gaussian(stddev, crop_x=11, crop_y=7, crop_width=61, crop_height=40)
+    crop = {"crop_x": 11, "crop_y": 7, "crop_width": 61, "crop_height": 40}
+    own_film = film_with(rfilter, **crop)
     random = np.random.default_rng(11)
     corner, extent = np.array([11, 7]), np.array([61, 40])
     count = 500 * samples_per_pixel
@@ -52,7 +83,7 @@ def test_sums_equal_those_of_an_image_block(
     sums, weights = core.render_selftest.accumulate(own_film, samples.tolist())
     expected = mitsuba_llvm(
         "image_block",
-        filter={"type": "gaussian", "stddev": stddev},
+        filter=rfilter,
         size=extent.tolist(),
         offset=corner.tolist(),
         samples=samples.tolist(),
