@@ -10,6 +10,7 @@
 #include "bind/watch.h"
 #include "geometry/triangle_test.h"
 #include "kdtree/lazy.h"
+#include "mlrta/trace_unordered.h"
 
 #include <memory>
 #include <mutex>
@@ -119,8 +120,12 @@ private:
     size_t count_;
 };
 
-uint32_t group_size(const TraceOptions &options) {
-    return std::max(options.initial_tile * options.initial_tile, 1024u);
+// Whether all rays are likely to have one origin: each group finds out for itself.
+uint32_t group_size(const RayArrays &rays, const TraceOptions &options) {
+    const size_t count = rays.count();
+    return unordered_group_size(options, count,
+                                count > 0 && rays.origin(0) == rays.origin(count / 2) &&
+                                    rays.origin(0) == rays.origin(count - 1));
 }
 
 nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
@@ -131,9 +136,10 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> primitive(rays.count());
     const Counters counters = rays.for_each_group(
-        group_size(trace_options), [&](size_t first, const RayGroup &group, Counters &c) {
-            trace_closest(*self.tree, group, trace_options,
-                          {t.data() + first, primitive.data() + first}, c);
+        group_size(rays, trace_options),
+        [&](size_t first, const RayGroup &group, Counters &c) {
+            trace_closest_unordered(*self.tree, group, trace_options,
+                                    {t.data() + first, primitive.data() + first}, c);
             for (size_t i = first; i < first + group.count; ++i)
                 if (primitive[i] != NO_PRIMITIVE) {
                     const Vec2f uv = barycentrics(rays.origin(i), rays.direction(i),
@@ -156,10 +162,12 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     std::vector<uint8_t> occluded(rays.count());
-    const Counters counters = rays.for_each_group(
-        group_size(trace_options), [&](size_t first, const RayGroup &group, Counters &c) {
-            trace_any(*self.tree, group, trace_options, occluded.data() + first, c);
-        });
+    const Counters counters =
+        rays.for_each_group(group_size(rays, trace_options),
+                            [&](size_t first, const RayGroup &group, Counters &c) {
+                                trace_any_unordered(*self.tree, group, trace_options,
+                                                    occluded.data() + first, c);
+                            });
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
     return to_numpy<bool>(std::move(occluded), {rays.count()});

@@ -1,0 +1,138 @@
+#include "mlrta/ray_order.h"
+
+#include "base/check.h"
+#include "base/simd.h"
+#include "mlrta/beam_packets.h"
+#include "traverse/load_packet.h"
+#include "traverse/parameter_interval.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+namespace mlrt {
+
+namespace {
+
+// A beam of rays in the order given may be so much wider than a square one of average area
+// before all are sorted; chosen.
+constexpr float WIDER = 2;
+
+// Cells along the longer side of the plane, as bits.
+constexpr uint32_t CELL_BITS = 10;
+
+uint32_t at_even_places(uint32_t bits) {
+    bits = (bits | (bits << 8)) & 0x00ff00ffu;
+    bits = (bits | (bits << 4)) & 0x0f0f0f0fu;
+    bits = (bits | (bits << 2)) & 0x33333333u;
+    return (bits | (bits << 1)) & 0x55555555u;
+}
+
+// The rectangle around points, lane by lane.
+struct Extent {
+    FloatPacket lo_x{INFINITE}, lo_y{INFINITE}, hi_x{-INFINITE}, hi_y{-INFINITE};
+
+    void add(const FloatPacket &x, const FloatPacket &y) {
+        lo_x = minimum(x, lo_x);
+        lo_y = minimum(y, lo_y);
+        hi_x = maximum(x, hi_x);
+        hi_y = maximum(y, hi_y);
+    }
+    float width() const { return greatest_lane(hi_x) - least_lane(lo_x); }
+    float height() const { return greatest_lane(hi_y) - least_lane(lo_y); }
+};
+
+} // namespace
+
+RayOrder::RayOrder(const RayGroup &rays) {
+    MLRT_CHECK(rays.count <= MOST_RAYS);
+    if (rays.count <= BeamPackets::MAX_RAYS)
+        return;
+    map_to_plane(rays);
+    pays_ = is_scattered();
+    if (pays_)
+        sort();
+}
+
+void RayOrder::map_to_plane(const RayGroup &rays) {
+    count_ = rays.count;
+    const size_t padded = (count_ + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
+    x_.resize(padded);
+    y_.resize(padded);
+    const FloatPacket zero(0.0f), one(1.0f);
+    Extent all;
+    float valid_x = 0, valid_y = 0;
+    for (uint32_t i = 0; i < count_; i += PACKET_WIDTH) {
+        const FloatPacket dx = load_padded(rays.direction[0], i, count_);
+        const FloatPacket dy = load_padded(rays.direction[1], i, count_);
+        const FloatPacket dz = load_padded(rays.direction[2], i, count_);
+        const FloatPacket scale = one / (absolute(dx) + absolute(dy) + absolute(dz));
+        const FloatPacket x = dx * scale, y = dy * scale;
+        const auto below = dz < zero;
+        const FloatPacket plane_x = select(below, copy_sign(one - absolute(y), x), x);
+        const FloatPacket plane_y = select(below, copy_sign(one - absolute(x), y), y);
+        store(&x_[i], plane_x);
+        store(&y_[i], plane_y);
+        const LaneBits valid =
+            to_bits((absolute(plane_x) <= one) & (absolute(plane_y) <= one));
+        if (valid != 0) {
+            const uint32_t lane = uint32_t(__builtin_ctz(valid));
+            valid_x = x_[i + lane];
+            valid_y = y_[i + lane];
+        }
+        // Directions that are not finite, or zero, and lanes behind the last ray: any place
+        // among the others will do.
+        for_each_lane(ALL_LANES & ~valid, [&](uint32_t lane) {
+            x_[i + lane] = valid_x;
+            y_[i + lane] = valid_y;
+        });
+        all.add(load<FloatPacket>(&x_[i]), load<FloatPacket>(&y_[i]));
+    }
+    left_ = least_lane(all.lo_x);
+    top_ = least_lane(all.lo_y);
+    width_ = all.width();
+    height_ = all.height();
+}
+
+// Compares the sum of the sides of the rectangles around consecutive rays with that of
+// squares which would tile the rectangle around all.
+bool RayOrder::is_scattered() const {
+    constexpr uint32_t run = BeamPackets::MAX_RAYS;
+    double sides = 0;
+    for (uint32_t first = 0; first + run <= count_; first += run) {
+        Extent extent;
+        for (uint32_t i = first; i < first + run; i += PACKET_WIDTH)
+            extent.add(load<FloatPacket>(&x_[i]), load<FloatPacket>(&y_[i]));
+        sides += extent.width() + extent.height();
+    }
+    const double runs = count_ / run;
+    const double square_side = std::sqrt(double(width_) * height_ / runs);
+    return sides / runs > WIDER * 2 * square_side;
+}
+
+// A counting sort in two steps of ten bits each, lower ones first.
+void RayOrder::sort() {
+    constexpr uint32_t CELLS = 1u << CELL_BITS;
+    const float side = std::max(width_, height_);
+    const float scale = side > 0 ? float(CELLS - 1) / side : 0;
+    std::vector<uint32_t> codes(count_), half_sorted(count_);
+    for (uint32_t i = 0; i < count_; ++i)
+        codes[i] = at_even_places(uint32_t(int((x_[i] - left_) * scale))) |
+                   at_even_places(uint32_t(int((y_[i] - top_) * scale))) << 1;
+    numbers_.resize(count_);
+    std::iota(numbers_.begin(), numbers_.end(), 0u);
+    for (const uint32_t shift : {0u, CELL_BITS}) {
+        const auto digit = [&](uint32_t ray) { return codes[ray] >> shift & (CELLS - 1); };
+        std::array<uint32_t, CELLS + 1> next{};
+        for (const uint32_t ray : numbers_)
+            ++next[digit(ray) + 1];
+        for (uint32_t i = 0; i < CELLS; ++i)
+            next[i + 1] += next[i];
+        for (const uint32_t ray : numbers_)
+            half_sorted[next[digit(ray)]++] = ray;
+        numbers_.swap(half_sorted);
+    }
+}
+
+} // namespace mlrt

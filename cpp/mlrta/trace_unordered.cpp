@@ -1,0 +1,104 @@
+#include "mlrta/trace_unordered.h"
+
+#include "mlrta/ray_order.h"
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+namespace mlrt {
+
+namespace {
+
+bool makes_beams(const RayGroup &rays, const TraceOptions &options) {
+    return rays.has_common_origin && rays.count <= RayOrder::MOST_RAYS &&
+           (options.traversal == Traversal::beam_leaf ||
+            options.traversal == Traversal::adaptive);
+}
+
+template <typename Value>
+std::vector<Value> in_order(const std::vector<uint32_t> &numbers, const Value *values) {
+    std::vector<Value> ordered(numbers.size());
+    for (size_t i = 0; i < numbers.size(); ++i)
+        ordered[i] = values[numbers[i]];
+    return ordered;
+}
+
+template <typename Value>
+void put_back(const std::vector<uint32_t> &numbers, const std::vector<Value> &ordered,
+              Value *values) {
+    for (size_t i = 0; i < numbers.size(); ++i)
+        values[numbers[i]] = ordered[i];
+}
+
+// Copies of the rays of a group in an order of their own.
+struct OrderedRays {
+    std::vector<float> direction[3], t_min, t_max;
+    RayGroup group;
+
+    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers)
+        : t_min(in_order(numbers, rays.t_min)), t_max(in_order(numbers, rays.t_max)),
+          group(rays) {
+        for (int k = 0; k < 3; ++k) {
+            direction[k] = in_order(numbers, rays.direction[k]);
+            group.direction[k] = direction[k].data();
+        }
+        group.t_min = t_min.data();
+        group.t_max = t_max.data();
+        group.cost = nullptr;
+    }
+    OrderedRays(const OrderedRays &) = delete;
+    OrderedRays &operator=(const OrderedRays &) = delete;
+};
+
+} // namespace
+
+uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays,
+                              bool have_common_origin) {
+    constexpr uint64_t ENOUGH_GROUPS = 16; // for all threads to have work; chosen
+    const uint64_t usual = std::max(options.initial_tile * options.initial_tile, 1024u);
+    if (!have_common_origin)
+        return uint32_t(usual);
+    return uint32_t(
+        std::max(usual, std::min<uint64_t>(rays / ENOUGH_GROUPS, RayOrder::MOST_RAYS)));
+}
+
+void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
+                             const TraceOptions &options, HitGroup hits,
+                             Counters &counters) {
+    std::optional<RayOrder> order;
+    if (makes_beams(rays, options))
+        order.emplace(rays);
+    if (!order || !order->pays()) {
+        trace_closest(tree, rays, options, hits, counters);
+        return;
+    }
+    const std::vector<uint32_t> &numbers = order->numbers();
+    const OrderedRays ordered(rays, numbers);
+    std::vector<float> t(hits.t ? rays.count : 0);
+    std::vector<uint32_t> primitive(rays.count);
+    trace_closest(tree, ordered.group, options,
+                  {hits.t ? t.data() : nullptr, primitive.data()}, counters);
+    if (hits.t)
+        put_back(numbers, t, hits.t);
+    put_back(numbers, primitive, hits.primitive);
+}
+
+void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
+                         const TraceOptions &options, uint8_t *occluded,
+                         Counters &counters) {
+    std::optional<RayOrder> order;
+    if (makes_beams(rays, options))
+        order.emplace(rays);
+    if (!order || !order->pays()) {
+        trace_any(tree, rays, options, occluded, counters);
+        return;
+    }
+    const std::vector<uint32_t> &numbers = order->numbers();
+    const OrderedRays ordered(rays, numbers);
+    std::vector<uint8_t> found(rays.count);
+    trace_any(tree, ordered.group, options, found.data(), counters);
+    put_back(numbers, found, occluded);
+}
+
+} // namespace mlrt

@@ -1,0 +1,25 @@
+// The door of the tracer for rays in any order, of which nobody knows whether neighbours
+// are neighbours in space. Answers are those of trace.h.
+#pragma once
+
+#include "mlrta/trace.h"
+
+#include <cstdint>
+
+namespace mlrt {
+
+// As many rays as are best handed over at once.
+uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays,
+                              bool have_common_origin);
+
+// Both sort the rays if they have a common origin, beams may be made of them, and that
+// makes beams much narrower. Others stay in their order: sorting incoherent rays by
+// origin and octant gained nothing beyond its own cost.
+void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
+                             const TraceOptions &options, HitGroup hits,
+                             Counters &counters);
+void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
+                         const TraceOptions &options, uint8_t *occluded,
+                         Counters &counters);
+
+} // namespace mlrt
