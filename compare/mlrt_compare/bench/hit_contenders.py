@@ -41,6 +41,11 @@ def hit_contenders(
         return hits.t, hits.primitive.astype(np.int64)
 
     mesh = native.module.Mesh(vertices, faces)
+    return [HitContender(MLRT, mlrt), *embree_contenders(native, mesh, threads)]
+
+
+def embree_contenders(native: Native, mesh: Any, threads: int) -> list[HitContender]:
+    """Embree in its default and in its robust mode; `mesh` is one of the native side."""
     device = embree_device(native.module, threads)
 
     def embree(robust: bool) -> Callable[[FloatArray, FloatArray], HitArrays]:
@@ -55,7 +60,6 @@ def hit_contenders(
         return closest_hit
 
     return [
-        HitContender(MLRT, mlrt),
         HitContender(f"{EMBREE} default", embree(False)),
         HitContender(f"{EMBREE} robust", embree(True)),
     ]

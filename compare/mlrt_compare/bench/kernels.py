@@ -1,5 +1,5 @@
 """What exactness costs and gives: the same traversal with tests of triangles in single and
-in double precision beside the exact one."""
+in double precision beside the exact one, and Embree in its default and its robust mode."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from mlrt_plugin import KdTree
 
+from .hit_contenders import HitContender, embree_contenders
 from .native import Native
 from .offset_scene import ball
 
@@ -25,6 +26,9 @@ KERNELS = {
     "double": "double precision",
     "exact": "exact",
 }
+USUAL = "MLRT as usual"
+EXACT = (KERNELS["exact"], USUAL)
+"""Contenders that must not lose a ray."""
 AIMS = ("vertices", "points of edges", "anywhere", "pixels")
 ORIGINS = 64
 """Points that rays start at; neighbours in a row share one."""
@@ -41,10 +45,11 @@ class Contender:
 
 
 def kernel_contenders(
-    native: Native, vertices: FloatArray, faces: npt.NDArray[np.uint32]
+    native: Native, vertices: FloatArray, faces: npt.NDArray[np.uint32], threads: int
 ) -> list[Contender]:
-    """All of them walk the tree of the fast builder in packets of 16 from the root; the
-    last traces as MLRT does by default."""
+    """The kernels walk the tree of the fast builder in packets of 16 from the root. Then
+    comes MLRT as it traces by default, and Embree, whose seconds, as MLRT's, include that
+    rays are read and hits are written as arrays."""
     mesh = native.module.Mesh(vertices, faces)
     tree = native.module.KdTree(mesh, {"builder": "fast"})
 
@@ -64,7 +69,19 @@ def kernel_contenders(
         seconds = time.perf_counter() - start
         return (hits.t, hits.primitive.astype(np.int64)), seconds
 
-    return [*(by_kernel(kernel) for kernel in KERNELS), Contender("MLRT as usual", usual)]
+    def timed(embree: HitContender) -> Contender:
+        def closest_hit(o: FloatArray, d: FloatArray) -> tuple[HitArrays, float]:
+            start = time.perf_counter()
+            hits = embree.closest_hit(o, d)
+            return hits, time.perf_counter() - start
+
+        return Contender(embree.name, closest_hit)
+
+    return [
+        *(by_kernel(kernel) for kernel in KERNELS),
+        Contender(USUAL, usual),
+        *map(timed, embree_contenders(native, mesh, threads)),
+    ]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from mlrt_plugin.threads import thread_count
 
 from .checkout import find_checkout
 from .figures import new_figures, show, write_json
-from .kernels import AIMS, closed_meshes, compare, kernel_contenders, rays_inside
+from .kernels import AIMS, EXACT, closed_meshes, compare, kernel_contenders, rays_inside
 from .machine import machine_record
 from .native import load_native
 from .options import default_cache
@@ -37,19 +37,21 @@ def run(options: argparse.Namespace) -> bool:
         figures["scenes"].append(scene)
         for threads in options.threads:
             with thread_count(threads):
-                contenders = kernel_contenders(native, mesh.vertices, mesh.faces)
+                contenders = kernel_contenders(native, mesh.vertices, mesh.faces, threads)
                 for aim in AIMS:
                     show_status(f"{mesh.name}, {aim}, {threads} threads")
                     rays = rays_inside(mesh, aim, options.rays, SEED)
                     rows = compare(contenders, *rays, options.repeats)
-                    leaks += sum(
-                        row["leaks"] for row in rows if "precision" not in row["name"]
-                    )
+                    leaks += sum(row["leaks"] for row in rows if row["name"] in EXACT)
                     show_status("")
                     scene["blocks"].append({"aim": aim, "threads": threads, "rows": rows})
                     title = f"{mesh.name}, {len(mesh.faces)} faces, rays at {aim}"
                     show(["", f"{title}, {threads} threads:", *lines(rows)])
         write_json(options.json, figures)
+    if options.plot is not None:
+        from .kernels_plot import write_plot
+
+        write_plot(options.plot, figures)
     return leaks == 0
 
 
