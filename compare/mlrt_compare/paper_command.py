@@ -21,6 +21,8 @@ from .options import (
 
 RESOLUTION, REPEATS = 1024, 15
 QUICK_RESOLUTION, QUICK_REPEATS = 128, 2
+QUICK_TILES = ((32, 128), (8, 32))
+"""ITS and MTS that are tried."""
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -69,24 +71,29 @@ def write_pages(folder: Path, figures: dict[str, Any]) -> list[Path]:
     """Writes what is drawn from the figures, and prints the tables; returns the paths."""
     from mlrt_plugin.image_files import replacing
 
+    from .paper.plots import plots
     from .paper.text import markdown
 
     text = markdown(figures)
     print(text)
-    page = folder / "paper.md"
-    with replacing(page) as temporary:
-        temporary.write_text(text)
-    return [page]
+    pages = {"paper.md": text.encode()}
+    pages |= {f"{name}.png": picture for name, picture in plots(figures)}
+    for name, content in pages.items():
+        with replacing(folder / name) as temporary:
+            temporary.write_bytes(content)
+    return [folder / name for name in pages]
 
 
 def plan_of(options: argparse.Namespace) -> Any:
     from .paper.study import Plan
+    from .paper.tile_sweep import Tiles
 
     quick = options.quick
     return Plan(
         threads=options.threads,
         resolution=options.resolution or (QUICK_RESOLUTION if quick else RESOLUTION),
         repeats=options.repeats or (QUICK_REPEATS if quick else REPEATS),
+        tiles=Tiles(*QUICK_TILES) if quick else Tiles(),
     )
 
 

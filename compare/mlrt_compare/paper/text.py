@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
+from .markdown_tables import row
 from .published import PUBLISHED, PublishedCounts
-from .study import measured
+from .sections import culling_lines, grouping_lines, rate_lines, tile_lines, tree_lines
+from .study import measured, sound
 from .ways import COUNTED, PAPER, WITHOUT
 
 SETTINGS = (
@@ -33,7 +34,15 @@ def markdown(figures: dict[str, Any]) -> str:
         ("primary_and_shadow", "Table 2: primary rays and shadow rays"),
     ):
         lines += ["", f"## {title}", "", *count_lines(figures, kind)]
+    lines += ["", "## Table 3: frames a second", "", *rate_lines(measured(figures))]
     lines += ["", "## Ways through the tree", "", *way_lines(figures)]
+    for title, section in (
+        ("Rules of the tree, and clipping", tree_lines),
+        ("Culling: steps 1 and 2, and the classic frustum test", culling_lines),
+        ("Tiles", tile_lines),
+        ("Control: random groups of rays", grouping_lines),
+    ):
+        lines += ["", f"## {title}", "", *section(measured(figures))]
     return "\n".join(lines) + "\n"
 
 
@@ -69,8 +78,8 @@ def head_lines(figures: dict[str, Any]) -> list[str]:
                 f"{tree['sah_cost']:.1f}",
             )
         )
-    if not all(scene["counts"]["one_image"] for scene in measured(figures)):
-        lines += ["", "**Ways through the tree gave different images.**"]
+    if not sound(figures):
+        lines += ["", "**Not all found the same hits, so the figures mean nothing.**"]
     return lines
 
 
@@ -129,16 +138,3 @@ def count_cells(counts: dict[str, float]) -> list[str]:
     """Steps, those of searches, cells of further entry points, and tests."""
     names = ("steps", "entry_steps", "frontier_tests", "tests")
     return [f"{counts[name]:.2f}" for name in names]
-
-
-def row(*cells: str) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """The first column to the left, the others, which are numbers, to the right."""
-    return [
-        row(*head),
-        "|---|" + "--:|" * (len(head) - 1),
-        *(row(*cells) for cells in rows),
-    ]
