@@ -10,12 +10,22 @@ from typing import Any
 import numpy as np
 import pytest
 import repository
+from mlrt_compare.bench.frame_runs import FrameRun
+from mlrt_compare.bench.measure import Timing
 from mlrt_compare.bench.scenes import BenchScene, imported
 from mlrt_compare.cli import main
+from mlrt_compare.paper.ablation import ablate_culling, ablate_tree
 from mlrt_compare.paper.counts import counts_of
+from mlrt_compare.paper.frame_times import summary
+from mlrt_compare.paper.grouping import camera_rays, groupings
 from mlrt_compare.paper.published import PUBLISHED, PublishedCounts
 from mlrt_compare.paper.scenes import StudiedScene
+from mlrt_compare.paper.sections import rate
+from mlrt_compare.paper.study import sound
 from mlrt_compare.paper.tables import count_ways
+from mlrt_compare.paper.text import markdown
+from mlrt_compare.paper.tile_sweep import Tiles, combinations, sweep_tiles
+from PIL import Image as Pillow
 
 OFFICE = repository.ROOT / "scenes" / "office" / "office.xml"
 SIDE = 64
@@ -193,3 +203,152 @@ def test_what_cannot_run_is_one_sentence(
     assert main(["paper", *source, *arguments]) == 4
     error = capsys.readouterr().err.strip()
     assert said in error.splitlines()[-1]
+
+
+def test_frames_are_timed_for_each_number_of_threads_and_kind_of_rays(run: Path) -> None:
+    office = json.loads((run / "paper.json").read_text())["scenes"][0]
+    found = [(block["threads"], block["shadows"]) for block in office["rates"]]
+    assert found == [(1, False), (1, True), (2, False), (2, True)]
+    for block in office["rates"]:
+        for frame in block["ways"].values():
+            walls = sorted(run["frame"]["wall"] for run in frame["runs"])
+            assert walls[0] <= 1 / frame["rate"] <= walls[-1]
+            assert frame["left_alone"] <= frame["frames"] == len(walls)
+
+
+def test_published_rates_stand_as_quoted(run: Path) -> None:
+    text = (run / "paper.md").read_text()
+    assert "| paper: OpenRT | 7.1 | 2.3 |  |  |" in text
+    assert "| paper: MLRTA | 70.2 | 37.8 |  |  |" in text
+    assert "| paper: MLRTA |  |  | 109.8 | 50.7 |" in text
+
+
+def test_frames_that_others_disturb_are_marked_unless_others_were_left_alone() -> None:
+    alone = FrameRun(Timing(2.0, 2.0, 0.0), 1, False)
+    disturbed = FrameRun(Timing(8.0, 2.0, 6.0), 1, True)
+    found = summary([alone, disturbed])
+    assert (found["rate"], found["left_alone"], found["frames"]) == (0.5, 1, 2)
+    assert rate(found) == "0.500"
+    only = summary([disturbed])
+    assert only["rate"] == 0.125 and rate(only).endswith("*")
+
+
+def test_trees_without_a_part_of_the_builder_differ_as_they_must(
+    office: BenchScene,
+) -> None:
+    found = ablate_tree(office, 32, 1, 1)
+    assert found["one_image"]
+    rows = {row["name"]: row for row in found["rows"]}
+    usual = rows["as usual"]
+    # A triangle's box reaches into more cells than the triangle does.
+    assert rows["no clipping"]["tree"]["references"] > usual["tree"]["references"]
+    # Without a least area cells go on being split.
+    assert rows["no rule 3 (least area)"]["tree"]["leaves"] > usual["tree"]["leaves"]
+    # Cells that rule 2 takes are leaves of their own that hold walls and floors.
+    assert (
+        rows["no rule 2 (flat cells)"]["without"]["primary"]["tests"]
+        > (usual["without"]["primary"]["tests"])
+    )
+
+
+def test_each_step_of_the_culling_finds_deeper_entry_points(studied: StudiedScene) -> None:
+    found = ablate_culling(studied, 1)
+    assert found["one_image"]
+    # What packets visit from the entry points.
+    visited = {
+        row["name"]: row["primary"]["steps"] - row["primary"]["entry_steps"]
+        for row in found["rows"]
+    }
+    assert visited["steps 1 and 2"] <= visited["step 2 by parameters"]
+    assert visited["step 2 by parameters"] <= visited["step 1 alone"]
+    assert visited["step 1 alone"] <= visited["neither"]
+    assert visited["steps 1 and 2"] <= visited["classic frustum test"]
+    assert visited["steps 1 and 2"] < visited["neither"]
+
+
+def test_tiles_are_each_combination_once() -> None:
+    options = combinations(Tiles())
+    assert len(options) == len({tuple(tried.values()) for tried in options})
+    assert all(tried["minimum_tile"] <= tried["initial_tile"] for tried in options)
+    # ITS 16, 32, 64, 128, 256 with MTS 4, 8, 16, 32, 64; the factor only where it matters.
+    assert len(options) == 5 + 7 + 9 + 10 + 10
+
+
+def test_smaller_tiles_take_more_search_and_leave_less_to_packets(
+    studied: StudiedScene,
+) -> None:
+    rows = sweep_tiles(studied, Tiles((64,), (8, 32)), 1)
+    by_tile = {
+        row["minimum_tile"]: row["primary"] for row in rows if row["split_factor"] == 4
+    }
+    small, large = by_tile[8], by_tile[32]
+    assert small["entry_steps"] > large["entry_steps"]
+    assert small["steps"] - small["entry_steps"] <= large["steps"] - large["entry_steps"]
+
+
+def test_camera_rays_hit_what_the_image_shows(studied: StudiedScene) -> None:
+    """Those of the control are the renderer's, through the centres of pixels: only where
+    an edge passes through a pixel may its jittered ray meet another face."""
+    rays = camera_rays(studied.lit.arrays.camera, SIDE)
+    hits = studied.lit.tree.closest_hit(*rays.ordered(np.arange(SIDE * SIDE)), {})
+    seen = studied.lit.render(aovs=("prim",)).aovs["prim"].ravel()
+    assert np.mean(hits[1] == seen) > 0.8
+    mirrored = seen.reshape(SIDE, SIDE)[:, ::-1].ravel()
+    assert np.mean(hits[1] == mirrored) < 0.5
+
+
+def test_groupings_are_of_pixels_each_once() -> None:
+    orders = groupings(64, 16, 1)
+    neighbours, within, random = orders.values()
+    assert np.array_equal(np.sort(neighbours), np.arange(64 * 64))
+    for order in (within, random):
+        assert len(np.unique(order)) == len(order)
+    # The first tile of neighbours is a square; one of random rays is not.
+    for order, is_square in ((neighbours, True), (within, True), (random, False)):
+        rows, columns = np.divmod(order[: 16 * 16], 64)
+        square = np.ptp(rows) == np.ptp(columns) == 15
+        assert square == is_square
+    # Within a tile packets of 4 x 4 pixels are torn apart.
+    rows, columns = np.divmod(neighbours[:16], 64)
+    assert np.ptp(rows) == np.ptp(columns) == 3
+    rows, columns = np.divmod(within[:16], 64)
+    assert np.ptp(rows) > 3 and np.ptp(columns) > 3
+
+
+def test_random_groups_cost_more_and_hit_the_same(run: Path) -> None:
+    office = json.loads((run / "paper.json").read_text())["scenes"][0]
+    assert office["grouping"]["same_hits"]
+    groups = office["grouping"]["groupings"]
+    for way in ("without", "with", "packet_without", "packet"):
+        for kind in ("primary", "shadow"):
+            costs = [group["ways"][way][kind]["steps"] for group in groups.values()]
+            assert costs[0] < costs[1] <= 1.05 * costs[2], (way, kind)
+    # The beam of random rays is that of all the view, which enters at the root, or just
+    # below it where the camera is outside: the search is in vain.
+    random = groups["random"]["ways"]
+    without, found = random["without"]["primary"], random["with"]["primary"]
+    visited = found["steps"] - found["entry_steps"]
+    assert 0.99 * without["steps"] < visited <= without["steps"]
+
+
+def test_other_hits_are_a_failure(run: Path) -> None:
+    figures = json.loads((run / "paper.json").read_text())
+    assert sound(figures)
+    for part, verdict in (
+        ("counts", "one_image"),
+        ("trees", "one_image"),
+        ("culling", "one_image"),
+        ("grouping", "same_hits"),
+    ):
+        broken = json.loads((run / "paper.json").read_text())
+        broken["scenes"][0][part][verdict] = False
+        assert not sound(broken)
+        assert "the figures mean nothing" in markdown(broken)
+
+
+def test_plots_are_there(run: Path) -> None:
+    for name in ("steps", "rates", "trees", "culling", "tiles", "grouping"):
+        with Pillow.open(run / f"paper-{name}.png") as picture:
+            assert min(picture.size) > 200
+            # Something is drawn.
+            assert len(picture.convert("RGB").getcolors(2**24) or ()) > 3

@@ -22,8 +22,9 @@ WAYS = (WITHOUT, PAPER, PACKET_WITHOUT, PACKET)
 BEFORE_THE_HIT = 1 - 2.0**-10
 """Where shadow rays end, of their length, so that they do not meet what was hit; chosen."""
 SEED = 1
-SAMPLED_RAYS = 2**14
-"""Of random groups, as one interval for such rays visits most of the tree; chosen."""
+TILE_RAYS, RANDOM_RAYS = 2**14, 2**12
+"""Traced in random order within tiles, and from anywhere; chosen. One interval for rays
+that go apart visits most of the tree, so that few must do."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,11 @@ def groupings(side: int, tile: int, seed: int) -> dict[str, npt.NDArray[np.int64
     random = np.random.default_rng(seed)
     neighbours = morton_order(side)
     tiles = neighbours[: len(neighbours) // tile**2 * tile**2].reshape(-1, tile**2)
-    chosen = random.permutation(tiles)[: max(SAMPLED_RAYS // tile**2, 1)]
+    chosen = random.permutation(tiles)[: max(TILE_RAYS // tile**2, 1)]
     return {
         "neighbours": neighbours,
         "random within tiles": random.permuted(chosen, axis=1).ravel(),
-        "random": random.permutation(neighbours)[:SAMPLED_RAYS],
+        "random": random.permutation(neighbours)[:RANDOM_RAYS],
     }
 
 

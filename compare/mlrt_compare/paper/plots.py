@@ -34,7 +34,7 @@ def plots(figures: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
 
 def draw_steps(scenes: Sequence[dict[str, Any]]) -> Figure:
     """Tables 1 and 2: ours in colour beside the paper's in grey, searches hatched."""
-    figure = Figure(figsize=(2.4 + 2.2 * len(scenes), 6.4), layout="constrained")
+    figure = Figure(figsize=(max(2.4 + 2.2 * len(scenes), 6), 6.8), layout="constrained")
     kinds = (("primary", "primary rays"), ("primary_and_shadow", "and shadow rays"))
     for axes, (kind, title) in zip(figure.subplots(2), kinds, strict=True):
         for place, scene in enumerate(scenes):
@@ -70,7 +70,8 @@ def draw_steps(scenes: Sequence[dict[str, Any]]) -> Figure:
         axes.set(ylabel="steps for 16 rays", title=title)
         axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(
-        "without MLRTA (blue), with (orange), of which search (hatched); grey: the paper",
+        "without MLRTA (blue) and with it (orange), of which search (hatched);\n"
+        "grey: the paper; below each pair its ratio",
         fontsize=9,
     )
     return figure
@@ -156,8 +157,9 @@ def draw_ablation(
         for number, (name, value) in enumerate(values.items()):
             axes.bar(
                 np.arange(len(rows)) + width * (number + 0.5) - 0.4,
-                [value(row) / value(rows[0]) for row in rows],
+                [value(row) / value(rows[0]) - 1 for row in rows],
                 width,
+                bottom=1,
                 color=COLOURS[number],
                 label=name,
             )

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..bench.table import number, plural
-from .grouping import SAMPLED_RAYS, WAYS
+from .grouping import RANDOM_RAYS, TILE_RAYS, WAYS
 from .markdown_tables import table
 from .published import PUBLISHED
 from .ways import PAPER, TIMED, WITHOUT
@@ -144,8 +144,8 @@ def grouping_lines(scenes: Scenes) -> list[str]:
     lines = [
         "The same rays, through the centres of pixels, in other groups, and a shadow ray "
         "to each hit, for each 16 rays: all with their neighbours; rays of the same tile "
-        f"(MTS) in random order; rays from anywhere. Of the latter two {SAMPLED_RAYS:,} "
-        "are traced. Each ray has the same hit in all of them.",
+        f"(MTS) in random order, of which {TILE_RAYS:,} are traced; {RANDOM_RAYS:,} rays "
+        "from anywhere. Each ray has the same hit in all of them.",
     ]
     for scene in scenes:
         rows = []
