@@ -78,11 +78,18 @@ def sweep_scenes(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def repeat_the_paper(arguments: Sequence[str]) -> int:
+    from .paper_command import run
+
+    return run(arguments)
+
+
 COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
     "ztest": judge_pixels,
     "speed-error": speed_and_error,
     "sweep": sweep_scenes,
+    "paper": repeat_the_paper,
 }
 """What the first argument may be instead of a scene; "scene" itself is the default."""

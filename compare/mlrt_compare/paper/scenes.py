@@ -1,0 +1,102 @@
+"""The scenes of the paper's tables, and others: triangles, a camera and one light."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mlrt_plugin.render import PreparedScene, prepare
+from mlrt_plugin.scene_arrays import (
+    Camera,
+    Emitter,
+    Film,
+    Lighting,
+    SceneArrays,
+    Shape,
+)
+
+from ..bench.errors import BenchError
+from ..bench.scenes import BenchScene, SceneSource, chosen_scenes, usual_scenes
+
+USUAL = ("office", "conference", "building", "dragon")
+LARGE_DRAGON = "dragon-7.2M"
+"""What stands in for the paper's dragon: as many triangles."""
+
+
+def paper_scenes(source: Path, names: Sequence[str] | None) -> list[SceneSource]:
+    """Scenes of a checkout by name, or by the path of an XML file; for None the USUAL.
+
+    Raises BenchError for a name that is neither.
+    """
+    usual = [
+        dataclasses.replace(scene, name="dragon") if scene.name == LARGE_DRAGON else scene
+        for scene in usual_scenes(source)
+    ]
+    return chosen_scenes(list(USUAL if names is None else names), usual)
+
+
+def arrays_of(scene: BenchScene, side: int, *, light: bool) -> SceneArrays:
+    """The scene in one grey, for a square film, lit by one point light or by none.
+
+    Without a light a frame has camera rays only.
+    """
+    view = scene.view
+    emitter = Emitter("point", (1.0, 1.0, 1.0), position=tuple(view["light"]))
+    return SceneArrays(
+        vertices=scene.vertices,
+        faces=scene.faces,
+        normals=np.zeros((0, 3), np.float32),
+        shapes=(Shape(0, len(scene.faces), material=0),),
+        materials=np.full((1, 2, 3), 0.5, np.float32),
+        emitters=(emitter,) if light else (),
+        camera=camera_of(view),
+        film=Film(side, side, 0, 0, side, side, "box", 0.5),
+        lighting=Lighting(),
+        spp=1,
+        base_seed=0,
+        features=(),
+        warnings=(),
+    )
+
+
+def camera_of(view: dict[str, Any]) -> Camera:
+    return Camera(
+        origin=tuple(view["origin"]),
+        axes=(tuple(view["axis_x"]), tuple(view["axis_y"]), tuple(view["axis_z"])),
+        tan_half_fov_x=view["tan_half_fov_x"],
+        near_clip=view["near_clip"],
+        far_clip=view["far_clip"],
+        principal_point_offset=(view["principal_point_x"], view["principal_point_y"]),
+    )
+
+
+class StudiedScene:
+    """A scene with one tree, ready to be traced without and with shadow rays."""
+
+    def __init__(self, scene: BenchScene, side: int, **build: Any) -> None:
+        """build: fields of `BuildOptions`. Raises BenchError if there is no triangle."""
+        if not len(scene.faces):
+            raise BenchError(f"the scene {scene.name} has no triangle")
+        self.scene = scene
+        self.side = side
+        self.lit = as_native(prepare(arrays_of(scene, side, light=True), **build))
+        self.unlit = as_native(
+            prepare(arrays_of(scene, side, light=False), previous=self.lit, **build)
+        )
+
+    @property
+    def rays(self) -> int:
+        """Of the camera, in a frame."""
+        return self.side * self.side
+
+    def prepared(self, shadows: bool) -> PreparedScene:
+        return self.lit if shadows else self.unlit
+
+
+def as_native(prepared: Any) -> PreparedScene:
+    assert isinstance(prepared, PreparedScene)  # what arrays of a scene always give
+    return prepared

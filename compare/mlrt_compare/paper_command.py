@@ -1,0 +1,161 @@
+"""mlrt-compare paper: the tables of the MLRTA paper on scenes of the same sizes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from .bench.options import counts, names
+from .options import (
+    FAILED,
+    PASSED,
+    PROGRAM,
+    CannotRun,
+    Parser,
+    at_least,
+    check_output_folder,
+)
+
+RESOLUTION, REPEATS = 1024, 15
+QUICK_RESOLUTION, QUICK_REPEATS = 128, 2
+QUICK_TILES = ((32, 128), (8, 32))
+"""ITS and MTS that are tried."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Runs the command and returns its exit code. Raises CannotRun."""
+    options = paper_parser().parse_args(arguments)
+    folder: Path = options.output
+    check_output_folder(folder)
+
+    from .bench.checkout import find_checkout
+    from .bench.errors import BenchError
+    from .bench.figures import measure_scenes, new_figures
+    from .bench.machine import machine_record
+    from .bench.options import default_cache
+    from .paper.scenes import paper_scenes
+    from .paper.study import sound, study
+
+    plan = plan_of(options)
+    try:
+        source = find_checkout(options.source)
+        scenes = paper_scenes(source, options.scenes)
+        folder.mkdir(exist_ok=True)
+        cache = options.cache or default_cache()
+        figures = new_figures("paper", machine_record(source, None), asdict(plan))
+
+        def measure(loaded: Any, scene: dict[str, Any]) -> None:
+            for part in study(loaded, plan):
+                scene |= part
+
+        measure_scenes(
+            figures,
+            scenes,
+            lambda chosen: chosen.load(cache),
+            measure,
+            folder / "paper.json",
+        )
+        paths = write_pages(folder, figures)
+    except BenchError as error:
+        raise CannotRun(str(error)) from error
+    except OSError as error:
+        raise CannotRun(f"{folder} cannot be written to: {error.strerror}") from error
+    print("wrote " + ", ".join(map(str, [folder / "paper.json", *paths])))
+    return PASSED if sound(figures) else FAILED
+
+
+def write_pages(folder: Path, figures: dict[str, Any]) -> list[Path]:
+    """Writes what is drawn from the figures, and prints the tables; returns the paths."""
+    from mlrt_plugin.image_files import replacing
+
+    from .paper.plots import plots
+    from .paper.text import markdown
+
+    text = markdown(figures)
+    print(text)
+    pages = {"paper.md": text.encode()}
+    pages |= {f"{name}.png": picture for name, picture in plots(figures)}
+    for name, content in pages.items():
+        with replacing(folder / name) as temporary:
+            temporary.write_bytes(content)
+    return [folder / name for name in pages]
+
+
+def plan_of(options: argparse.Namespace) -> Any:
+    from .paper.study import Plan
+    from .paper.tile_sweep import Tiles
+
+    quick = options.quick
+    return Plan(
+        threads=options.threads,
+        resolution=options.resolution or (QUICK_RESOLUTION if quick else RESOLUTION),
+        repeats=options.repeats or (QUICK_REPEATS if quick else REPEATS),
+        tiles=Tiles(*QUICK_TILES) if quick else Tiles(),
+    )
+
+
+def paper_parser() -> argparse.ArgumentParser:
+    parser = Parser(
+        prog=f"{PROGRAM} paper",
+        description="Repeats tables 1, 2 and 3 of the MLRTA paper (Reshetov, Soupikov and "
+        "Hurley 2005) on scenes of the same sizes, beside the published figures: steps "
+        "through the tree and tests of triangles, with and without entry points, for "
+        "primary and shadow rays. Scenes that are not there are skipped by name.",
+        epilog="Exit codes: 0 done; 2 ways through the tree gave different hits; 4 could "
+        "not run.",
+    )
+    parser.add_argument(
+        "--scenes",
+        type=names,
+        metavar="A,B",
+        help="of office, conference, building, dragon-2.2M and dragon, or XML files "
+        "(office,conference,building,dragon)",
+    )
+    parser.add_argument(
+        "--threads",
+        type=counts,
+        default=(1, 2),
+        metavar="N,M",
+        help="numbers of them that frames are timed with (1,2)",
+    )
+    parser.add_argument(
+        "--resolution",
+        type=at_least(16, 2**14),
+        metavar="N",
+        help=f"pixels along both sides of the frame ({RESOLUTION}, the paper's)",
+    )
+    parser.add_argument(
+        "--repeats",
+        type=at_least(1, 2**14),
+        metavar="N",
+        help=f"frames of each that are timed ({REPEATS})",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help=f"a trial: {QUICK_RESOLUTION} pixels, {QUICK_REPEATS} frames, unless told",
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="folder for generated scenes (~/.cache/mlrt-bench)",
+    )
+    parser.add_argument(
+        "--source",
+        type=Path,
+        metavar="DIR",
+        help="MLRT's source checkout, which has the scenes (the current one)",
+    )
+    parser.add_argument(
+        "-o",
+        dest="output",
+        type=Path,
+        default=Path("paper"),
+        metavar="DIR",
+        help="folder for tables, figures and plots, made if its parent exists (paper)",
+    )
+    return parser
