@@ -94,7 +94,13 @@ def rows_of(tables: str) -> list[list[str]]:
 
 def test_every_notebook_is_tested() -> None:
     names = {path.stem for path in FOLDER.glob("*.py")}
-    assert names == {"01_first_picture", "02_side_by_side", "03_timing"}
+    assert names == {
+        "01_first_picture",
+        "02_side_by_side",
+        "03_timing",
+        "04_speed_against_error",
+        "05_kd_tree",
+    }
 
 
 def test_first_picture(executed: Callable[[str], Outputs]) -> None:
@@ -136,3 +142,33 @@ def test_timing(executed: Callable[[str], Outputs]) -> None:
     if abs(max(percents) - 10) > 0.1:
         assert ("not to be published" in left.tables) == (max(percents) > 10)
     assert "processor" in left.text and "load" in left.text
+
+
+def test_speed_against_error(executed: Callable[[str], Outputs]) -> None:
+    left = executed("04_speed_against_error")
+    assert len(left.figures) == 3
+    assert all(shows_something(figure) for figure in left.figures)
+    assert "**PASS**" in left.tables
+    points = [row for row in rows_of(left.tables) if row[0].isdigit()]
+    assert [int(row[0]) for row in points] == [1, 2, 4, 8]
+    for row in points:
+        # Both take the same samples, so both have the same error.
+        assert float(row[3]) == pytest.approx(float(row[4]), rel=0.01)
+    errors = [float(row[3]) for row in points]
+    assert errors == sorted(errors, reverse=True)
+    assert 5 < errors[0] / errors[-1] < 12
+
+
+def test_kd_tree(executed: Callable[[str], Outputs]) -> None:
+    left = executed("05_kd_tree")
+    assert len(left.figures) == 3
+    assert all(shows_something(figure) for figure in left.figures)
+    assert "the same image: True" in left.text
+    table = {row[0]: [float(cell) for cell in row[1:]] for row in rows_of(left.tables)[1:]}
+    from_root, from_entry_points, _ = table["packet steps"]
+    search_of_root, search, _ = table["search steps"]
+    assert search_of_root == 0 < search
+    # What the paper is about: the searches cost less than they save.
+    assert from_entry_points + search < 0.7 * from_root
+    beam_steps = table["beam steps"]
+    assert beam_steps[:2] == [0, 0] and beam_steps[2] > 0
