@@ -44,7 +44,9 @@ print(f"{tree['triangles']} triangles, {tree['nodes']} nodes, {tree['depth']} de
 # deep in the tree and skip most of it, **dark ones** start near the root, because what they
 # see lies on both sides of one of the first split planes. Look for the dark bands: they
 # follow such planes across the image, where walls and ceiling meet and along furniture.
-# Plain walls between them are bright, or of one colour.
+# Plain walls between them are bright, or of one colour. Furniture is bright where one
+# triangle covers a whole tile, so that nothing behind it counts; along the diagonal of the
+# back of a chair, where two triangles meet, neither does.
 
 # %%
 import matplotlib.pyplot as plt
