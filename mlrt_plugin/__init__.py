@@ -14,6 +14,7 @@ from .errors import (
     TreeFileError,
     UnsupportedFeature,
 )
+from .image_tiles import ImageTile, image_tiles
 from .render import PreparedScene, RenderResult, prepare, render
 from .scene_arrays import SceneArrays
 from .scene_import import import_scene
@@ -22,6 +23,7 @@ from .tree import Hits, KdTree
 __version__ = "0.1.0"
 __all__ = [
     "Hits",
+    "ImageTile",
     "KdTree",
     "MlrtError",
     "MlrtWarning",
@@ -33,6 +35,7 @@ __all__ = [
     "TreeFileError",
     "UnsupportedFeature",
     "__version__",
+    "image_tiles",
     "import_scene",
     "isa",
     "prepare",

@@ -20,6 +20,9 @@ BOOTSTRAP_SEED = 20_050_731
 """Chosen; intervals come out the same for the same runs."""
 BEYOND = 1.25
 """A curve is continued up to this factor beyond its ends, which noise may move."""
+LARGEST_FACTOR = 1e6
+"""Chosen: what is larger comes from times that differ by noise only, whose steep line was
+continued, and is no factor."""
 
 Array = NDArray[np.float64]
 Factor = Callable[[Array, Array, int], float | None]
@@ -131,14 +134,17 @@ class Runs:
 
 def equal_time(seconds: Array, mse: Array, index: int) -> float | None:
     """The other renderer's MSE at an index over ours at its time, ours interpolated in
-    logarithms; None beyond our curve. With the arguments exchanged: the factor in time at
-    equal error."""
+    logarithms; None beyond our curve, and beyond LARGEST_FACTOR. With the arguments
+    exchanged: the factor in time at equal error."""
     if not (np.all(mse > 0) and np.all(seconds > 0)):
         return None
     ours = interpolated(
         float(np.log(seconds[1, index])), np.log(seconds[0]), np.log(mse[0])
     )
-    return None if ours is None else float(mse[1, index] / np.exp(ours))
+    if ours is None:
+        return None
+    factor = float(np.log(mse[1, index])) - ours
+    return float(np.exp(factor)) if abs(factor) < np.log(LARGEST_FACTOR) else None
 
 
 def equal_error(seconds: Array, mse: Array, index: int) -> float | None:

@@ -78,6 +78,16 @@ def test_a_converged_reference_without_error_left_has_no_factor() -> None:
     assert exact.efficiency(0, 0).value is None
 
 
+def test_a_line_through_times_of_the_same_tells_no_factor() -> None:
+    """Through (1 s, 0.8) and (1 s and a rounding, 0.1) it falls by hundreds of decades
+    until 1.2 s."""
+    seconds = np.array([[1.0, 1 + 1e-6], [1.2, 1.2]])
+    mse = np.array([[0.8, 0.1], [0.8, 0.1]])
+    assert equal_time(seconds, mse, 0) is None
+    # Ten times as much for what is within the curve is an honest factor.
+    assert equal_time(np.array([[1.0, 2.0], [2.0, 4.0]]), mse, 0) == pytest.approx(8)
+
+
 def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     print("seed", SEED)
     generator = np.random.default_rng(SEED)
