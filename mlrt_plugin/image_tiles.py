@@ -55,7 +55,8 @@ def image_tiles(
     They are dealt out as rays are at one sample a pixel: squares of `initial_tile` pixels,
     split until they have at most `minimum_tile` along a side, or until their entry point is
     a leaf and cannot get deeper (Reshetov, Soupikov and Hurley 2005, section 3). Each has
-    one entry point, searched from the root for the beam of its rectangle.
+    one entry point, searched from the root for the beam of its rectangle. Of a lazy tree
+    only what rays have built so far counts.
 
     initial_tile, minimum_tile: powers of two from 4 on. split_factor: 4 or 16.
     options: those of `SEARCH_OPTIONS`.

@@ -123,6 +123,13 @@ def test_crop_has_the_tiles_of_its_part_of_the_image(office: Any) -> None:
     assert len(set(part.values())) > 5
 
 
+def test_a_lazy_tree_is_entered_as_deep_as_it_is_built() -> None:
+    lazy = mlrt_plugin.prepare(OFFICE, resolution=SIZE, builder="lazy")
+    assert {tile.depth for tile in image_tiles(lazy)} == {0}
+    lazy.render(spp=1)
+    assert len({tile.depth for tile in image_tiles(lazy)}) > 2
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -52,11 +52,7 @@ def execute(name: str, target: Path) -> dict[str, Any]:
         capture_output=True,
         text=True,
         timeout=300,
-        env={
-            **os.environ,
-            "MLRT_NOTEBOOKS": "small",
-            "XDG_CACHE_HOME": str(target.parent / "cache"),
-        },
+        env={**os.environ, "MLRT_NOTEBOOKS": "small"},
     )
     assert child.returncode == 0, child.stdout + child.stderr
     notebook: dict[str, Any] = json.loads(target.read_text())
@@ -68,8 +64,10 @@ def outputs_of(notebook: dict[str, Any]) -> Outputs:
     for cell in notebook["cells"]:
         for output in cell.get("outputs", ()):
             assert output["output_type"] != "error"
-            assert output.get("name") != "stderr", output["text"]
-            text += "".join(output.get("text", ()))
+            # Of matplotlib, once on each machine.
+            told = "".join(output.get("text", ()))
+            assert output.get("name") != "stderr" or "font cache" in told, told
+            text += told
             data = output.get("data", {})
             tables += "".join(data.get("text/markdown", ()))
             if "image/png" in data:
