@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -19,6 +20,7 @@ from .options import (
     check_output_folder,
 )
 
+FIGURES = "paper.json"
 RESOLUTION, REPEATS = 1024, 15
 QUICK_RESOLUTION, QUICK_REPEATS = 128, 2
 QUICK_TILES = ((32, 128), (8, 32))
@@ -31,40 +33,62 @@ def run(arguments: Sequence[str]) -> int:
     folder: Path = options.output
     check_output_folder(folder)
 
-    from .bench.checkout import find_checkout
     from .bench.errors import BenchError
-    from .bench.figures import measure_scenes, new_figures
-    from .bench.machine import machine_record
-    from .bench.options import default_cache
-    from .paper.scenes import paper_scenes
-    from .paper.study import sound, study
+    from .bench.status import show_status
+    from .paper.study import measured, sound
 
-    plan = plan_of(options)
     try:
-        source = find_checkout(options.source)
-        scenes = paper_scenes(source, options.scenes)
-        folder.mkdir(exist_ok=True)
-        cache = options.cache or default_cache()
-        figures = new_figures("paper", machine_record(source, None), asdict(plan))
-
-        def measure(loaded: Any, scene: dict[str, Any]) -> None:
-            for part in study(loaded, plan):
-                scene |= part
-
-        measure_scenes(
-            figures,
-            scenes,
-            lambda chosen: chosen.load(cache),
-            measure,
-            folder / "paper.json",
-        )
+        figures = read_figures(folder) if options.redraw else measure(options, folder)
+        if not measured(figures):
+            raise CannotRun(f"{folder / FIGURES} has no scene that was measured to the end")
         paths = write_pages(folder, figures)
     except BenchError as error:
         raise CannotRun(str(error)) from error
     except OSError as error:
         raise CannotRun(f"{folder} cannot be written to: {error.strerror}") from error
-    print("wrote " + ", ".join(map(str, [folder / "paper.json", *paths])))
+    finally:
+        show_status("")
+    print("wrote " + ", ".join(map(str, paths)))
     return PASSED if sound(figures) else FAILED
+
+
+def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
+    """All figures, which are kept in the folder part by part. Raises BenchError."""
+    from .bench.checkout import find_checkout
+    from .bench.figures import measure_scenes, new_figures
+    from .bench.figures import write_json as keep
+    from .bench.machine import machine_record
+    from .bench.options import default_cache
+    from .paper.scenes import paper_scenes
+    from .paper.study import study
+
+    plan = plan_of(options)
+    source = find_checkout(options.source)
+    scenes = paper_scenes(source, options.scenes)
+    folder.mkdir(exist_ok=True)
+    kept = folder / FIGURES
+    cache = options.cache or default_cache()
+    figures = new_figures("paper", machine_record(source, None), asdict(plan))
+
+    def measure_scene(loaded: Any, scene: dict[str, Any]) -> None:
+        for part in study(loaded, plan):
+            scene |= part
+            keep(kept, figures)
+
+    measure_scenes(figures, scenes, lambda chosen: chosen.load(cache), measure_scene, kept)
+    return figures
+
+
+def read_figures(folder: Path) -> dict[str, Any]:
+    """What an earlier run kept. Raises CannotRun if that cannot be read."""
+    path = folder / FIGURES
+    try:
+        figures = json.loads(path.read_text())
+    except (OSError, ValueError) as error:
+        raise CannotRun(f"{path} cannot be read: {error}") from error
+    if not (isinstance(figures, dict) and figures.get("benchmark") == "paper"):
+        raise CannotRun(f"{path} was not written by {PROGRAM} paper")
+    return figures
 
 
 def write_pages(folder: Path, figures: dict[str, Any]) -> list[Path]:
@@ -137,6 +161,11 @@ def paper_parser() -> argparse.ArgumentParser:
         "--quick",
         action="store_true",
         help=f"a trial: {QUICK_RESOLUTION} pixels, {QUICK_REPEATS} frames, unless told",
+    )
+    parser.add_argument(
+        "--redraw",
+        action="store_true",
+        help=f"tables and plots anew, from {FIGURES} of an earlier run in the folder",
     )
     parser.add_argument(
         "--cache",

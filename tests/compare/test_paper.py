@@ -352,3 +352,29 @@ def test_plots_are_there(run: Path) -> None:
             assert min(picture.size) > 200
             # Something is drawn.
             assert len(picture.convert("RGB").getcolors(2**24) or ()) > 3
+
+
+def test_pages_are_drawn_anew_from_the_figures(run: Path, tmp_path: Path) -> None:
+    (tmp_path / "paper.json").write_text((run / "paper.json").read_text())
+    assert main(["paper", "--redraw", "-o", str(tmp_path)]) == 0
+    for name in ("paper.md", "paper-steps.png"):
+        assert (tmp_path / name).read_bytes() == (run / name).read_bytes()
+
+
+def test_figures_that_cannot_be_drawn_are_one_sentence(
+    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kept = tmp_path / "paper.json"
+    unfinished = json.loads((run / "paper.json").read_text())
+    del unfinished["scenes"][0]["trees"]
+    for text, said in (
+        (None, "cannot be read"),
+        ("{", "cannot be read"),
+        ('{"benchmark": "rays"}', "was not written by mlrt-compare paper"),
+        (json.dumps(unfinished), "no scene that was measured to the end"),
+    ):
+        if text is not None:
+            kept.write_text(text)
+        assert main(["paper", "--redraw", "-o", str(tmp_path)]) == 4
+        (line,) = capsys.readouterr().err.strip().splitlines()
+        assert said in line

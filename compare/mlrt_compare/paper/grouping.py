@@ -22,7 +22,7 @@ WAYS = (WITHOUT, PAPER, PACKET_WITHOUT, PACKET)
 BEFORE_THE_HIT = 1 - 2.0**-10
 """Where shadow rays end, of their length, so that they do not meet what was hit; chosen."""
 SEED = 1
-TILE_RAYS, RANDOM_RAYS = 2**14, 2**12
+TILE_RAYS, RANDOM_RAYS = 2**14, 2**11
 """Traced in random order within tiles, and from anywhere; chosen. One interval for rays
 that go apart visits most of the tree, so that few must do."""
 

@@ -62,7 +62,9 @@ def published_rates(scene: dict[str, Any]) -> Iterator[list[str]]:
 def tree_lines(scenes: Scenes) -> list[str]:
     lines = [
         "Steps and tests of primary rays; frames with MLRTA and shadow rays on one thread, "
-        "in the least CPU time. One tree was measured after another.",
+        "in the least CPU time. One tree was measured after another. The paper tells of "
+        "about 50 % better traversal by its three rules, over a tree that it does not "
+        "describe.",
     ]
     for scene in scenes:
         rows = [

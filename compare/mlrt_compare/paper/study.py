@@ -32,6 +32,10 @@ class Plan:
     tiles: Tiles
 
 
+PARTS = ("counts", "grouping", "rates", "culling", "tiles", "trees")
+"""Of the figures of a scene, in the order in which they are measured."""
+
+
 def study(scene: BenchScene, plan: Plan) -> Iterator[dict[str, Any]]:
     """Figures of the scene, part by part."""
     show_status(f"{scene.name}: building")
@@ -66,4 +70,5 @@ def sound(figures: dict[str, Any]) -> bool:
 
 
 def measured(figures: dict[str, Any]) -> list[dict[str, Any]]:
-    return [scene for scene in figures["scenes"] if scene["skipped"] is None]
+    """Scenes of which all parts are there."""
+    return [scene for scene in figures["scenes"] if set(PARTS) <= scene.keys()]

@@ -22,7 +22,9 @@ SETTINGS = (
     "",
     "Scenes, views and lights are not those of the paper, which counts 1024 x 1024 "
     "pixels: compare ratios. Its tests, too, are of packets, not of rays, and leave out "
-    "those that bounding boxes save.",
+    "those that bounding boxes save. The mean gains of its text, 3.25 with primary rays "
+    "and 2.75 with shadow rays over its first three scenes, are more than those of the "
+    "steps in its tables, 2.62 and 2.02.",
 )
 
 
@@ -65,6 +67,9 @@ def head_lines(figures: dict[str, Any]) -> list[str]:
     for scene in figures["scenes"]:
         if scene["skipped"] is not None:
             lines.append(f"| {scene['name']} | skipped: {scene['skipped']} | | | | | |")
+            continue
+        if scene not in measured(figures):
+            lines.append(f"| {scene['name']} | not finished | | | | | |")
             continue
         published, tree = PUBLISHED.get(scene["name"]), scene["tree"]
         lines.append(
