@@ -11,6 +11,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from ..bench.table import plural
 from .grouping import WAYS
@@ -165,6 +166,9 @@ def draw_ablation(
             )
         axes.axhline(1, color="black", lw=0.7)
         axes.set_yscale("log", base=2)
+        low, high = axes.get_ylim()
+        steps = (1, 1.25, 1.5, 1.75) if high < 8 * low else (1,)
+        axes.yaxis.set_major_locator(LogLocator(base=2, subs=steps))
         axes.yaxis.set_major_formatter("{x:g}")
         names = [row["name"].replace(" (", "\n(").replace(", ", ",\n") for row in rows]
         axes.set_xticks(range(len(rows)), names, fontsize=7)
@@ -188,7 +192,7 @@ def draw_tiles(scenes: Sequence[dict[str, Any]]) -> Figure:
         for side, (label, value) in enumerate(
             (
                 ("steps for 16 primary rays", tile_steps),
-                ("CPU ms a frame, shadows", tile_milliseconds),
+                ("CPU ms a frame", tile_milliseconds),
             )
         ):
             axes = figure.add_subplot(len(scenes), 2, 2 * number + side + 1)
