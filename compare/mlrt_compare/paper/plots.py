@@ -84,14 +84,16 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
     for axes, scene in zip(panels(figure, len(scenes)), scenes, strict=True):
         blocks = scene["rates"]
         for number, way in enumerate(TIMED):
-            rates = [block["ways"][way.key]["rate"] for block in blocks]
-            axes.bar(
+            frames = [block["ways"][way.key] for block in blocks]
+            bars = axes.bar(
                 np.arange(len(blocks)) + 0.11 * number - 0.33,
-                rates,
+                [frame["rate"] for frame in frames],
                 0.1,
                 color=COLOURS[number],
                 label=way.name,
             )
+            for bar, frame in zip(bars, frames, strict=True):
+                bar.set_alpha(1 if frame["left_alone"] else 0.35)
         published = PUBLISHED.get(scene["name"])
         for place, block in enumerate(blocks):
             if published is None or published.rates is None or published.shaded is None:
@@ -115,7 +117,11 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
         ncols=2,
         fontsize=8,
     )
-    figure.suptitle("black lines: the paper's (OpenRT below MLRTA), of 2005", fontsize=9)
+    figure.suptitle(
+        "black lines: the paper's, 1024 x 1024 pixels (OpenRT below MLRTA), of 2005;\n"
+        "pale: others had a part of the machine, not to be published",
+        fontsize=9,
+    )
     return figure
 
 
