@@ -11,6 +11,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
 from ..bench.table import plural
 from .grouping import WAYS
@@ -83,14 +84,16 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
     for axes, scene in zip(panels(figure, len(scenes)), scenes, strict=True):
         blocks = scene["rates"]
         for number, way in enumerate(TIMED):
-            rates = [block["ways"][way.key]["rate"] for block in blocks]
-            axes.bar(
+            frames = [block["ways"][way.key] for block in blocks]
+            bars = axes.bar(
                 np.arange(len(blocks)) + 0.11 * number - 0.33,
-                rates,
+                [frame["rate"] for frame in frames],
                 0.1,
                 color=COLOURS[number],
                 label=way.name,
             )
+            for bar, frame in zip(bars, frames, strict=True):
+                bar.set_alpha(1 if frame["left_alone"] else 0.35)
         published = PUBLISHED.get(scene["name"])
         for place, block in enumerate(blocks):
             if published is None or published.rates is None or published.shaded is None:
@@ -114,7 +117,11 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
         ncols=2,
         fontsize=8,
     )
-    figure.suptitle("black lines: the paper's (OpenRT below MLRTA), of 2005", fontsize=9)
+    figure.suptitle(
+        "black lines: the paper's, 1024 x 1024 pixels (OpenRT below MLRTA), of 2005;\n"
+        "pale: others had a part of the machine, not to be published",
+        fontsize=9,
+    )
     return figure
 
 
@@ -165,6 +172,9 @@ def draw_ablation(
             )
         axes.axhline(1, color="black", lw=0.7)
         axes.set_yscale("log", base=2)
+        low, high = axes.get_ylim()
+        steps = (1, 1.25, 1.5, 1.75) if high < 8 * low else (1,)
+        axes.yaxis.set_major_locator(LogLocator(base=2, subs=steps))
         axes.yaxis.set_major_formatter("{x:g}")
         names = [row["name"].replace(" (", "\n(").replace(", ", ",\n") for row in rows]
         axes.set_xticks(range(len(rows)), names, fontsize=7)
@@ -188,7 +198,7 @@ def draw_tiles(scenes: Sequence[dict[str, Any]]) -> Figure:
         for side, (label, value) in enumerate(
             (
                 ("steps for 16 primary rays", tile_steps),
-                ("CPU ms a frame, shadows", tile_milliseconds),
+                ("CPU ms a frame", tile_milliseconds),
             )
         ):
             axes = figure.add_subplot(len(scenes), 2, 2 * number + side + 1)

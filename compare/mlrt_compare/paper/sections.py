@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ..bench.table import number, plural
-from .grouping import RANDOM_RAYS, TILE_RAYS, WAYS
+from .grouping import WAYS
 from .markdown_tables import table
 from .published import PUBLISHED
 from .ways import PAPER, TIMED, WITHOUT
@@ -61,8 +61,8 @@ def published_rates(scene: dict[str, Any]) -> Iterator[list[str]]:
 
 def tree_lines(scenes: Scenes) -> list[str]:
     lines = [
-        "Steps and tests of primary rays; frames with MLRTA and shadow rays on one thread, "
-        "in the least CPU time. One tree was measured after another. The paper tells of "
+        "Steps and tests of primary rays; frames of these with MLRTA on one thread, in the "
+        "least CPU time. One tree was measured after another. The paper tells of "
         "about 50 % better traversal by its three rules, over a tree that it does not "
         "describe.",
     ]
@@ -110,8 +110,8 @@ def tile_lines(scenes: Scenes) -> list[str]:
     """Steps, and time over the least, for each ITS and split factor by MTS."""
     lines = [
         "The paper's traversal and search, `interval` with one entry point a tile: steps "
-        "of primary rays (of which search), and CPU time of a frame with shadow rays on "
-        "one thread over the least.",
+        "of primary rays (of which search), and CPU time of a frame of these on one thread "
+        "over the least.",
     ]
     for scene in scenes:
         rows = scene["tiles"]
@@ -146,8 +146,8 @@ def grouping_lines(scenes: Scenes) -> list[str]:
     lines = [
         "The same rays, through the centres of pixels, in other groups, and a shadow ray "
         "to each hit, for each 16 rays: all with their neighbours; rays of the same tile "
-        f"(MTS) in random order, of which {TILE_RAYS:,} are traced; {RANDOM_RAYS:,} rays "
-        "from anywhere. Each ray has the same hit in all of them.",
+        "(MTS) in random order; rays from anywhere. Each ray has the same hit in all of "
+        "them.",
     ]
     for scene in scenes:
         rows = []
@@ -156,7 +156,7 @@ def grouping_lines(scenes: Scenes) -> list[str]:
                 counts = grouping["ways"][way.key]
                 rows.append(
                     [
-                        f"{name}: {way.name}",
+                        f"{name} ({grouping['rays']:,} rays): {way.name}",
                         *(
                             f"{counts[kind][what]:,.1f}"
                             for kind in ("primary", "shadow")
@@ -165,6 +165,6 @@ def grouping_lines(scenes: Scenes) -> list[str]:
                     ]
                 )
         head = ["steps", "of which search", "tests"]
-        heads = [*head, *(f"shadow {name}" for name in head)]
+        heads = [*head, "steps of shadow rays", *head[1:]]
         lines += ["", *table([scene["name"], *heads], rows)]
     return lines

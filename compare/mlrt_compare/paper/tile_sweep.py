@@ -38,7 +38,7 @@ def combinations(tiles: Tiles) -> list[dict[str, Any]]:
 
 def sweep_tiles(studied: StudiedScene, tiles: Tiles, repeats: int) -> list[dict[str, Any]]:
     """A row for each combination with the paper's search and traversal: counts of primary
-    rays and with shadow rays, and the frame with shadow rays on one thread."""
+    rays and with shadow rays, and the frame without shadow rays on one thread."""
     options = combinations(tiles)
     rows = []
     for number, tried in enumerate(options):
@@ -55,7 +55,7 @@ def sweep_tiles(studied: StudiedScene, tiles: Tiles, repeats: int) -> list[dict[
         )
     with thread_count(1):
         frames = time_in_turns(
-            studied.lit,
+            studied.unlit,
             [{**PAPER_SEARCH, **tried} for tried in options],
             1,
             repeats,
