@@ -69,8 +69,12 @@ class LibLlvm:
     def usable(self) -> bool:
         return self.version[0] >= MINIMUM_MAJOR
 
+    @property
+    def name(self) -> str:
+        return f"LLVM {'.'.join(map(str, self.version))}"
+
     def __str__(self) -> str:
-        return f"LLVM {'.'.join(map(str, self.version))} ({self.path})"
+        return f"{self.name} ({self.path})"
 
 
 def probe(path: Path, runtime: tuple[Path, ...] = ()) -> LibLlvm | None:

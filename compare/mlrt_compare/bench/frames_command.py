@@ -25,7 +25,7 @@ def run(options: argparse.Namespace, library: LibLlvm) -> bool:
     scenes = chosen_scenes(options.scenes or USUAL_SCENES, scenes_of_rays(source))
     cache = options.cache or default_cache()
     settings = Settings(options.threads, options.repeats, options.resolution, options.spp)
-    machine = {**machine_record(source, None), "llvm": str(library)}
+    machine = {**machine_record(source, None), "llvm": library.name}
     figures = new_figures("frames", machine, asdict(settings))
     show(frames_table.head_lines(machine, figures["settings"]))
 
