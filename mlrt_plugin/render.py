@@ -24,7 +24,7 @@ from .options import (
     integer,
     split_options,
 )
-from .scene_arrays import Lighting, SceneArrays
+from .scene_arrays import Lighting, SceneArrays, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
 from .threads import thread_count
@@ -98,14 +98,7 @@ class PreparedScene:
 
     def tree_for(self, arrays: SceneArrays, build_options: dict[str, Any]) -> Any:
         """The tree if it is that of other arrays too, bit for bit, else None."""
-        own = self.arrays
-        same = (
-            build_options == self.build_options
-            and np.array_equal(own.faces, arrays.faces)
-            and np.array_equal(
-                own.vertices.view(np.uint32), arrays.vertices.view(np.uint32)
-            )
-        )
+        same = build_options == self.build_options and same_geometry(self.arrays, arrays)
         return self.tree if same else None
 
     def warn(self, stacklevel: int = 1) -> None:

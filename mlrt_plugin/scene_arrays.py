@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,23 @@ NONE = 0xFFFFFFFF
 
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
+
+
+class HasGeometry(Protocol):
+    """vertices: (V, 3) float32. faces: (F, 3) uint32."""
+
+    @property
+    def vertices(self) -> npt.NDArray[np.float32]: ...
+
+    @property
+    def faces(self) -> npt.NDArray[np.uint32]: ...
+
+
+def same_geometry(one: HasGeometry, other: HasGeometry) -> bool:
+    """Whether vertices and faces are the same, bit for bit."""
+    return np.array_equal(one.faces, other.faces) and np.array_equal(
+        one.vertices.view(np.uint32), other.vertices.view(np.uint32)
+    )
 
 
 @dataclass(frozen=True)

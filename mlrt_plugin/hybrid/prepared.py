@@ -24,7 +24,7 @@ from ..render import (
     checked_spp,
     chosen_shadow_offset,
 )
-from ..scene_arrays import Lighting
+from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree
 from ..tree_report import tree_report
@@ -79,11 +79,7 @@ class PreparedHybrid:
         None."""
         if self.faces is None or build_options != self.build_options:
             return None
-        own = self.faces.geometry
-        same = np.array_equal(own.faces, arrays.faces) and np.array_equal(
-            own.vertices.view(np.uint32), arrays.vertices.view(np.uint32)
-        )
-        return self.tree if same else None
+        return self.tree if same_geometry(self.faces.geometry, arrays) else None
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
