@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import warnings
+from collections.abc import Iterable
 
 
 class MlrtError(ValueError):
@@ -27,6 +29,12 @@ class TreeFileError(MlrtError):
 
 class MlrtWarning(UserWarning):
     """Something in the scene is approximated or ignored; the message names it."""
+
+
+def warn_of(messages: Iterable[str], stacklevel: int) -> None:
+    """Warns of each; 1 makes the caller of this function the place, 2 its caller."""
+    for message in messages:
+        warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
 
 
 def one_sentence(message: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import os
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -14,7 +13,7 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .emitters import check_distances
-from .errors import MlrtError, MlrtWarning
+from .errors import MlrtError, warn_of
 from .integrators import own_aovs
 from .options import (
     AOVS,
@@ -103,8 +102,7 @@ class PreparedScene:
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
-        for message in self.warnings:
-            warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
+        warn_of(self.warnings, stacklevel + 1)
 
     def render(
         self,
@@ -309,9 +307,7 @@ def render(
             progress=progress,
             **trace,
         )
-        for message in result.warnings:
-            if message not in prepared.warnings:
-                warnings.warn(message, MlrtWarning, stacklevel=2)
+        warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
 
 

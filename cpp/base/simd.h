@@ -1,5 +1,5 @@
-// The vocabulary of vector code: the only place that knows Dr.Jit and the width of a
-// register.
+// The vocabulary of vector code: the only place, but for morton.h, that knows Dr.Jit, and
+// the only one that knows the width of a register.
 //
 // A packet is 16 lanes on every processor; narrower instruction sets run it in two or four
 // parts. Arithmetic is plain IEEE: the same operations in the same order give the same bits

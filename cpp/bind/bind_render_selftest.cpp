@@ -5,10 +5,12 @@
 #include "render/camera.h"
 #include "render/emitter_sampling.h"
 #include "render/film_blocks.h"
+#include "render/picture_film.h"
 #include "render/sampler.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
 #include "render/surface.h"
+#include "render/work_items.h"
 
 #include <array>
 #include <nanobind/ndarray.h>
@@ -86,6 +88,34 @@ accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &s
             sums.push_back(sum);
         }
     return {sums, weights};
+}
+
+// What a film makes of the samples of one channel, which the three colours share: those of
+// each pixel of the crop row by row, added in groups of up to rays_per_group.
+std::vector<float> picture(const nb::dict &film_dict, uint32_t samples_per_pixel,
+                           uint32_t rays_per_group, const std::vector<float> &samples) {
+    const Film film = film_from(film_dict);
+    const size_t pixels = size_t(film.crop_width) * film.crop_height;
+    if (!ReconstructionFilter(film).is_box() ||
+        samples.size() != pixels * samples_per_pixel)
+        refuse_value("The filter must be a box, with samples for each pixel.");
+    std::vector<float> image(3 * pixels);
+    PictureFilm picture_film(film, samples_per_pixel, {image.data(), {}});
+    const WorkItems items(picture_film.sampled(), samples_per_pixel, rays_per_group);
+    for (uint32_t item = 0; item < items.count(); ++item)
+        items.for_each_group(item, [&](const PixelGroup &group) {
+            std::vector<float> values;
+            for (size_t i = 0; i < group.offsets.size(); ++i) {
+                const Pixel pixel = group.pixel(i);
+                const size_t number = size_t(pixel.row) * film.crop_width + pixel.column;
+                for (uint32_t k = 0; k < group.sample_count; ++k)
+                    values.push_back(
+                        samples[number * samples_per_pixel + group.first_sample + k]);
+            }
+            const float *colours[3] = {values.data(), values.data(), values.data()};
+            picture_film.add(group, nullptr, nullptr, colours);
+        });
+    return image;
 }
 
 nb::dict emitter_sample(const SceneHandle &handle, const Floats3 &p, float x, float y) {
@@ -208,6 +238,8 @@ void bind_render_selftest(nb::module_ &m) {
           nb::arg("x"), nb::arg("y"));
     s.def("filter_weights", &filter_weights, nb::arg("film"), nb::arg("distances"));
     s.def("accumulate", &accumulate, nb::arg("film"), nb::arg("samples"));
+    s.def("picture", &picture, nb::arg("film"), nb::arg("samples_per_pixel"),
+          nb::arg("rays_per_group"), nb::arg("samples"));
     s.def("sample_emitter", &emitter_sample, nb::arg("scene"), nb::arg("p"), nb::arg("x"),
           nb::arg("y"));
     s.def("hit_surface", &hit_surface_of, nb::arg("scene"), nb::arg("origin"),

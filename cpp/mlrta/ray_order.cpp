@@ -1,6 +1,7 @@
 #include "mlrta/ray_order.h"
 
 #include "base/check.h"
+#include "base/morton.h"
 #include "base/simd.h"
 #include "mlrta/beam_packets.h"
 #include "traverse/load_packet.h"
@@ -21,13 +22,6 @@ constexpr float WIDER = 2;
 
 // Cells along the longer side of the plane, as bits.
 constexpr uint32_t CELL_BITS = 10;
-
-uint32_t at_even_places(uint32_t bits) {
-    bits = (bits | (bits << 8)) & 0x00ff00ffu;
-    bits = (bits | (bits << 4)) & 0x0f0f0f0fu;
-    bits = (bits | (bits << 2)) & 0x33333333u;
-    return (bits | (bits << 1)) & 0x55555555u;
-}
 
 // The rectangle around points, lane by lane.
 struct Extent {
@@ -118,8 +112,8 @@ void RayOrder::sort() {
     const float scale = side > 0 ? float(CELLS - 1) / side : 0;
     std::vector<uint32_t> codes(count_), half_sorted(count_);
     for (uint32_t i = 0; i < count_; ++i)
-        codes[i] = at_even_places(uint32_t(int((x_[i] - left_) * scale))) |
-                   at_even_places(uint32_t(int((y_[i] - top_) * scale))) << 1;
+        codes[i] = morton_code(uint32_t(int((x_[i] - left_) * scale)),
+                               uint32_t(int((y_[i] - top_) * scale)));
     numbers_.resize(count_);
     std::iota(numbers_.begin(), numbers_.end(), 0u);
     for (const uint32_t shift : {0u, CELL_BITS}) {

@@ -13,8 +13,7 @@ uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays,
                               bool have_common_origin);
 
 // Both sort the rays if they have a common origin, beams may be made of them, and that
-// makes beams much narrower. Others stay in their order: sorting incoherent rays by
-// origin and octant gained nothing beyond its own cost.
+// makes beams much narrower. Others stay in their order.
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters);

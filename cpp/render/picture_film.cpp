@@ -1,5 +1,7 @@
 #include "render/picture_film.h"
 
+#include "base/morton.h"
+
 #include <utility>
 
 namespace mlrt {
@@ -11,7 +13,7 @@ PictureFilm::PictureFilm(const Film &film, uint32_t samples_per_pixel, FilmTarge
     if (!filter.is_box())
         blocks_.emplace(film, channel_count());
     for (uint32_t column = 0; column < column_codes_.size(); ++column)
-        column_codes_[column] = morton_code({column, 0});
+        column_codes_[column] = morton_code(column, 0);
 }
 
 void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
@@ -41,7 +43,7 @@ void PictureFilm::write_pixels(const PixelGroup &group, const float *const *valu
     };
     for (uint32_t row = 0; row < group.side; ++row) {
         float *out = target_.image + COLOURS * number_of({group.left, group.top + row});
-        const uint32_t of_row = morton_code({0, row});
+        const uint32_t of_row = morton_code(0, row);
         for (uint32_t column = 0; column < group.side; ++column, out += COLOURS)
             write(out, of_row | column_codes_[column]);
     }

@@ -11,29 +11,6 @@ struct Pixel {
     uint32_t column = 0, row = 0;
 };
 
-// The number of a pixel in Morton order: bits of the column at even places, of the row at
-// odd ones. Of coordinates below 2^16.
-inline uint32_t morton_code(Pixel pixel) {
-    const auto spread = [](uint32_t bits) {
-        bits = (bits | (bits << 8)) & 0x00ff00ffu;
-        bits = (bits | (bits << 4)) & 0x0f0f0f0fu;
-        bits = (bits | (bits << 2)) & 0x33333333u;
-        return (bits | (bits << 1)) & 0x55555555u;
-    };
-    return spread(pixel.column) | spread(pixel.row) << 1;
-}
-
-inline Pixel of_morton_code(uint32_t code) {
-    const auto gather = [](uint32_t bits) {
-        bits &= 0x55555555u;
-        bits = (bits | (bits >> 1)) & 0x33333333u;
-        bits = (bits | (bits >> 2)) & 0x0f0f0f0fu;
-        bits = (bits | (bits >> 4)) & 0x00ff00ffu;
-        return (bits | (bits >> 8)) & 0x0000ffffu;
-    };
-    return {gather(code), gather(code >> 1)};
-}
-
 // Samples [first_sample, first_sample + sample_count) of each of some pixels. Rays come in
 // the order of the pixels and, within each, of samples.
 struct PixelGroup {

@@ -82,9 +82,8 @@ PreparedScene::PreparedScene(SceneData scene_data)
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];
         any_shape_glows |= shape.emitter != NONE;
-        const Material material =
-            shape.material == NONE ? Material{} : data.materials[shape.material];
-        shape_colours.push_back({material.front, material.back, shape.emitter});
+        shape_materials.push_back(shape.material == NONE ? Material{}
+                                                         : data.materials[shape.material]);
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 

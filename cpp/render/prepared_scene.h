@@ -22,17 +22,11 @@ struct EmitterTable {
     bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
 
-// What shading asks of a shape.
-struct ShapeColours {
-    Vec3f front{}, back{}; // reflectance
-    uint32_t emitter = NONE;
-};
-
 struct PreparedScene {
     SceneData data;
     ImagePlane plane;
     std::vector<uint32_t> shape_of_face;
-    std::vector<ShapeColours> shape_colours; // one a shape
+    std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely

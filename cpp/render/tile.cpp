@@ -38,9 +38,9 @@ Vec3<FloatPacket> albedo_of(const PreparedScene &scene, const UIntPacket &shapes
             albedo[k] = select(mask, FloatPacket(colour[k]), albedo[k]);
     };
     for_each_value(shapes, lanes, [&](uint32_t shape, LaneBits holders) {
-        const ShapeColours &colours = scene.shape_colours[shape];
-        set(holders & seen_from_front, colours.front);
-        set(holders & ~seen_from_front, colours.back);
+        const Material &material = scene.shape_materials[shape];
+        set(holders & seen_from_front, material.front);
+        set(holders & ~seen_from_front, material.back);
     });
     return albedo;
 }
@@ -196,7 +196,7 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     LaneBits hidden = 0;
     const LaneArray<uint32_t> rays = to_lanes<uint32_t>(hit.ray);
     for_each_value(shapes, hit.lanes, [&](uint32_t shape, LaneBits holders) {
-        const uint32_t number = scene_.shape_colours[shape].emitter;
+        const uint32_t number = scene_.data.shapes[shape].emitter;
         if (number == NONE)
             return;
         if (scene_.data.hide_emitters) {

@@ -1,5 +1,7 @@
 #include "render/work_items.h"
 
+#include "base/morton.h"
+
 #include <algorithm>
 
 namespace mlrt {
@@ -14,13 +16,15 @@ WorkItems::WorkItems(const PixelRect &sampled, uint32_t samples_per_pixel,
     side_ = std::max(group_side_, FilmBlocks::BLOCK_SIZE);
     across_ = (width_ + side_ - 1) / side_;
     down_ = (height_ + side_ - 1) / side_;
-    for (uint32_t code = 0; code < group_side_ * group_side_; ++code)
-        square_.push_back(of_morton_code(code));
+    for (uint32_t code = 0; code < group_side_ * group_side_; ++code) {
+        const MortonPoint at = of_morton_code(code);
+        square_.push_back({at.column, at.row});
+    }
 }
 
 PixelGroup WorkItems::group_at(uint32_t item, uint32_t number,
                                std::vector<Pixel> &clipped) const {
-    const Pixel at = of_morton_code(number);
+    const MortonPoint at = of_morton_code(number);
     PixelGroup group;
     group.left = item % across_ * side_ + at.column * group_side_;
     group.top = item / across_ * side_ + at.row * group_side_;

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import time
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +11,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from ..errors import MlrtError, MlrtWarning, SceneError, one_sentence
+from ..errors import MlrtError, SceneError, one_sentence, warn_of
 from ..integrators import own_aovs
 from ..options import BUILD_OPTIONS, TRACE_OPTIONS
 from ..render import (
@@ -83,8 +82,7 @@ class PreparedHybrid:
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
-        for message in self.warnings:
-            warnings.warn(message, MlrtWarning, stacklevel=stacklevel + 1)
+        warn_of(self.warnings, stacklevel + 1)
 
     def render(
         self,

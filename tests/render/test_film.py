@@ -91,3 +91,32 @@ def test_sums_equal_those_of_an_image_block(
     np.testing.assert_allclose(np.reshape(sums, (40, 61)), expected[..., 0], atol=3e-5)
     np.testing.assert_allclose(np.reshape(weights, (40, 61)), expected[..., 1], atol=3e-5)
     assert np.count_nonzero(expected[..., 1]) > 300
+
+
+@pytest.mark.parametrize("rays_per_group", [16, 1024])
+@pytest.mark.parametrize("samples_per_pixel", [1, 4, 37])
+def test_pixels_of_a_box_equal_those_of_an_image_block(
+    mitsuba_llvm: MitsubaWorker, samples_per_pixel: int, rays_per_group: int
+) -> None:
+    """Also where the samples of a pixel come in several groups."""
+    width, height = 61, 40
+    crop = {"crop_x": 11, "crop_y": 7, "crop_width": width, "crop_height": height}
+    values = np.random.default_rng(13).random(
+        (height, width, samples_per_pixel), np.float32
+    )
+    image = core.render_selftest.picture(
+        film(**crop), samples_per_pixel, rays_per_group, values.ravel().tolist()
+    )
+    rows, columns, _ = np.indices(values.shape)
+    # Mitsuba adds at the pixel, not at the position.
+    samples = np.stack([columns + 11, rows + 7, values], axis=-1).reshape(-1, 3)
+    expected = mitsuba_llvm(
+        "image_block",
+        filter={"type": "box"},
+        size=[width, height],
+        offset=[11, 7],
+        samples=samples.tolist(),
+    )
+    np.testing.assert_array_equal(expected[..., 1], samples_per_pixel)
+    for colour in np.moveaxis(np.reshape(image, (height, width, 3)), -1, 0):
+        np.testing.assert_allclose(colour, expected[..., 0] / samples_per_pixel, rtol=3e-6)

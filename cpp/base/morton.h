@@ -1,0 +1,25 @@
+// The Morton curve through a square grid: the bits of the column at even places of a
+// number, those of the row at odd ones.
+#pragma once
+
+#include <cstdint>
+#include <drjit/array.h>
+#include <drjit/morton.h>
+
+namespace mlrt {
+
+struct MortonPoint {
+    uint32_t column = 0, row = 0;
+};
+
+// Of coordinates below 2^16.
+inline uint32_t morton_code(uint32_t column, uint32_t row) {
+    return drjit::morton_encode(drjit::Array<uint32_t, 2>(column, row));
+}
+
+inline MortonPoint of_morton_code(uint32_t code) {
+    const auto point = drjit::morton_decode<drjit::Array<uint32_t, 2>>(code);
+    return {point.entry(0), point.entry(1)};
+}
+
+} // namespace mlrt
