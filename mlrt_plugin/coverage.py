@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from .elements import Element
 from .features import REFUSED, SAMPLERS, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
+from .materials import DELTA
 from .scene_arrays import Lighting
 
 MITSUBA = "3.9.1"
@@ -51,9 +52,18 @@ PLUGINS = {
     ),
 }
 """All plugins of Mitsuba, by the kind of object that they make."""
+NO_LIGHT_SAMPLE = (
+    "black for light samples; by Mitsuba where BSDF samples can find lights in it"
+)
 REMARKS = {
-    ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
-    ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
+    ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
+    ("bsdf", "diffuse"): "in constant colours and with native textures",
+    ("bsdf", "mask"): "of native materials; shadow rays stop at it, as in `direct`; by "
+    "Mitsuba where BSDF samples can find lights through it",
+    **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in DELTA},
+    ("texture", "bitmap"): "on materials; on lights, and of loaded scenes, by Mitsuba",
+    ("texture", "checkerboard"): "on materials; on lights by Mitsuba",
+    ("texture", "mesh_attribute"): "on materials; on lights by Mitsuba",
     ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",

@@ -6,16 +6,19 @@ from collections.abc import Iterator
 
 from .elements import Element
 from .errors import UnsupportedFeature
+from .materials import DELTA
 from .scene_arrays import Feature
+from .textures import VARYING
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
-BSDFS = ("diffuse", "twosided")
+BSDFS = ("diffuse", "twosided", "mask", *DELTA)
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent",)
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
+TEXTURES = (*CONSTANT_TEXTURES, *VARYING)
 
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
 REFUSED = {
@@ -36,7 +39,7 @@ NATIVE = {
     "sensor": SENSORS,
     "film": FILMS,
     "rfilter": FILTERS,
-    "texture": CONSTANT_TEXTURES,
+    "texture": TEXTURES,
 }
 
 
@@ -68,12 +71,20 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    textures = [child.plugin for child in element.children_of("texture")]
+    if kind == "emitter" and set(textures) & set(VARYING):
+        return "textures of lights are not supported yet"
+    if kind == "shape" and textures:
+        return "textures that are attributes of a shape are not supported yet"
+    if plugin == "bitmap" and element.loaded:
+        return "a loaded bitmap does not tell its filter_type and wrap_mode"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
-        child.plugin != "diffuse" for child in element.children_of("bsdf")
+        child.plugin not in ("diffuse", "conductor")
+        for child in element.children_of("bsdf")
     ):
-        return "only diffuse materials can be nested in it so far"
+        return "only diffuse materials and conductors can be nested in it so far"
     return ""
 
 

@@ -24,6 +24,7 @@ class Geometry:
     faces: npt.NDArray[np.uint32]
     normals: npt.NDArray[np.float32]
     first_faces: list[int]
+    first_vertices: list[int]
     face_counts: list[int]
     vertex_normals: list[bool]
     flip_normals: list[bool]
@@ -40,6 +41,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
     """
     vertices, faces, normals = [], [], []
     interpolated, flipped, first_faces, not_finite = [], [], [], []
+    first_vertices = []
     warnings: list[str] = []
     vertex_count = face_count = 0
     for shape, name in zip(shapes, names, strict=True):
@@ -72,6 +74,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
             warnings.append(warning)
         not_finite.append(dropped)
         first_faces.append(face_count)
+        first_vertices.append(vertex_count)
         vertices.append(points)
         faces.append(corners + np.uint32(vertex_count))
         normals.append(directions)
@@ -90,6 +93,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         if any(interpolated)
         else np.zeros((0, 3), np.float32),
         first_faces=first_faces,
+        first_vertices=first_vertices,
         face_counts=[len(f) for f in faces],
         vertex_normals=interpolated,
         flip_normals=flipped,

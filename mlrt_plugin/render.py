@@ -26,6 +26,7 @@ from .options import (
 from .scene_arrays import Lighting, SceneArrays, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
+from .texture_arrays import fields_of
 from .threads import thread_count
 from .tree_cache import ObtainedTree, obtain_tree
 from .tree_report import invisible_meshes, tree_report
@@ -221,7 +222,7 @@ def prepare(
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,
-        arrays.faces if len(arrays.normals) else arrays.faces[:0],
+        arrays.faces if len(arrays.normals) or arrays.textures else arrays.faces[:0],
         arrays.normals,
         [dataclasses.asdict(shape) for shape in arrays.shapes],
         arrays.materials,
@@ -229,6 +230,9 @@ def prepare(
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
+        arrays.uvs,
+        [fields_of(texture) for texture in arrays.textures],
+        arrays.material_textures,
     )
     return PreparedScene(
         arrays,

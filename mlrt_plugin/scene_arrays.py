@@ -14,6 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from .texture_arrays import Texture
+
 NONE = 0xFFFFFFFF
 """Marks the absence of a material, emitter or shape."""
 
@@ -48,6 +50,7 @@ class Shape:
     emitter: int = NONE
     vertex_normals: bool = False
     flip_normals: bool = False
+    texture_coordinates: bool = False
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,8 @@ class SceneArrays:
     faces: (F, 3) uint32, numbers of vertices; the faces of a shape follow one another.
     normals: (V, 3) float32, unit; (0, 3) if no shape interpolates vertex normals.
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
+    material_textures: (M, 3) uint32, numbers of textures in place of these two, and of the
+    opacity, or NONE. uvs: (V, 2) float32; (0, 2) if no texture needs any.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
     each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
@@ -171,6 +176,9 @@ class SceneArrays:
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
     not_finite_faces: tuple[int, ...] = ()
+    textures: tuple[Texture, ...] = ()
+    material_textures: npt.NDArray[np.uint32] | None = None
+    uvs: npt.NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):

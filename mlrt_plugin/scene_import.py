@@ -20,6 +20,8 @@ from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
 from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
+from .texture_coordinates import gather_coordinates
+from .textures import Surface
 
 SceneSource = Any
 """A path of an XML file, a dictionary as ``mi.load_dict`` takes it, or a loaded
@@ -301,6 +303,14 @@ def collect(
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
+    surfaces = zip(
+        shapes, shape_names, geometry.first_faces, geometry.first_vertices, strict=True
+    )
+    rows = [materials.add(Surface(*surface), names) for surface in surfaces]
+    textured = materials.uses_coordinates()
+    coordinates = gather_coordinates(
+        shapes, shape_names, [textured[row] for row in rows], geometry.first_vertices
+    )
     emitter_of_shape = [NONE] * len(shapes)
     shape_of_emitter = [NONE] * len(sources)
     for number, shape in enumerate(shapes):
@@ -320,12 +330,13 @@ def collect(
             Shape(
                 first_face=geometry.first_faces[number],
                 face_count=geometry.face_counts[number],
-                material=materials.add(shape.bsdf(), shape_names[number]),
+                material=rows[number],
                 emitter=emitter_of_shape[number],
                 vertex_normals=geometry.vertex_normals[number],
                 flip_normals=geometry.flip_normals[number],
+                texture_coordinates=coordinates.present[number],
             )
-            for number, shape in enumerate(shapes)
+            for number in range(len(shapes))
         ),
         materials=materials.array(),
         emitters=tuple(
@@ -340,9 +351,14 @@ def collect(
         spp=int(sampler.sample_count()),
         base_seed=int(objects.described(sampler, "base_seed", "0")),
         features=found,
-        warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
+        warnings=tuple(
+            dict.fromkeys([*warnings, *geometry.warnings, *coordinates.warnings, *ignored])
+        ),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
+        textures=tuple(materials.textures.textures),
+        material_textures=materials.texture_array(),
+        uvs=coordinates.uvs,
     )
 
 

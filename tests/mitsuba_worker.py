@@ -78,6 +78,15 @@ def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any
     return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
 
 
+def render_file(folder: Path, path: str, spp: int, seed: int, bsdf_samples: int = 0) -> Any:
+    """The picture of ``direct`` with one emitter sample, of a scene file."""
+    import mitsuba as mi
+
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": bsdf_samples}
+    loaded = mi.load_file(path, optimize=False)
+    return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
+
+
 def sampler(folder: Path, seed: int, samples: int, size: int, dimensions: int) -> Any:
     """Numbers of the sampler ``independent``: shape (size, dimensions)."""
     import mitsuba as mi
@@ -133,12 +142,15 @@ def main(folder: Path) -> None:
         import mitsuba as mi
 
         mi.set_variant("llvm_ad_rgb")
+        # Its log goes to standard output, where the answers are.
+        mi.set_log_level(mi.LogLevel.Error)
     except (llvm.LlvmUnavailable, ImportError) as error:
         print(" ".join(str(error).split()), file=answers, flush=True)
         return
     print(READY, file=answers, flush=True)
     functions = {
         "render": render,
+        "render_file": render_file,
         "sampler": sampler,
         "image_block": image_block,
         "nearest_hits": nearest_hits,

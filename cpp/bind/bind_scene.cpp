@@ -2,12 +2,15 @@
 #include "bind/bind.h"
 #include "bind/fields.h"
 #include "bind/scene_handle.h"
+#include "bind/textures.h"
 #include "bind/tree_handle.h"
 #include "render/filter.h"
 
 #include <cmath>
 #include <cstring>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <optional>
 #include <string>
 
 namespace nb = nanobind;
@@ -25,14 +28,39 @@ std::string numbered(const char *list, size_t i) {
 
 template <typename Element, typename T>
 std::vector<Element> rows(const Array<T> &array, const char *name) {
-    static_assert(sizeof(Element) == 3 * sizeof(T));
-    if (array.ndim() != 2 || array.shape(1) != 3)
-        refuse_value(std::string(name) + " must have shape (N, 3).");
+    constexpr size_t width = sizeof(Element) / sizeof(T);
+    static_assert(sizeof(Element) == width * sizeof(T));
+    if (array.ndim() != 2 || array.shape(1) != width)
+        refuse_value(std::string(name) + " must have shape (N, " + std::to_string(width) +
+                     ").");
     std::vector<Element> result(array.shape(0));
     if (!result.empty())
         std::memcpy(static_cast<void *>(result.data()), array.data(),
                     result.size() * sizeof(Element));
     return result;
+}
+
+uint32_t texture_number(uint32_t number, size_t material, size_t count) {
+    if (number != NONE && number >= count)
+        refuse_value(numbered("material_textures", material) + " refers to texture " +
+                     std::to_string(number) + ", but there are " + std::to_string(count) +
+                     ".");
+    return number;
+}
+
+void add_textures(std::vector<Material> &materials,
+                  const std::optional<Array<uint32_t>> &numbers, size_t texture_count) {
+    if (!numbers)
+        return;
+    if (numbers->ndim() != 2 || numbers->shape(0) != materials.size() ||
+        numbers->shape(1) != 3)
+        refuse_value("material_textures must have shape (M, 3), as many as materials.");
+    for (size_t i = 0; i < materials.size(); ++i) {
+        const uint32_t *in = numbers->data() + 3 * i;
+        materials[i].front_texture = texture_number(in[0], i, texture_count);
+        materials[i].back_texture = texture_number(in[1], i, texture_count);
+        materials[i].opacity = texture_number(in[2], i, texture_count);
+    }
 }
 
 std::vector<Material> materials_from(const Array<float> &array) {
@@ -41,7 +69,9 @@ std::vector<Material> materials_from(const Array<float> &array) {
     std::vector<Material> materials;
     for (size_t i = 0; i < array.shape(0); ++i) {
         const float *in = array.data() + 6 * i;
-        materials.push_back({{in[0], in[1], in[2]}, {in[3], in[4], in[5]}});
+        Material &material = materials.emplace_back();
+        material.front = {in[0], in[1], in[2]};
+        material.back = {in[3], in[4], in[5]};
         for (int k = 0; k < 6; ++k)
             if (!(std::isfinite(in[k]) && in[k] >= 0))
                 refuse_value(numbered("materials", i) +
@@ -60,6 +90,7 @@ Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scen
     shape.emitter = fields.index("emitter", emitter_count, NONE);
     shape.vertex_normals = fields.boolean("vertex_normals", false);
     shape.flip_normals = fields.boolean("flip_normals", false);
+    shape.texture_coordinates = fields.boolean("texture_coordinates", false);
     fields.finish();
     if (shape.vertex_normals && (scene.faces.empty() || scene.normals.empty()))
         refuse_value(name + " has vertex normals, but faces or normals are empty.");
@@ -169,12 +200,18 @@ void check_vertices(const SceneData &scene) {
 SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &normals, const nb::list &shapes,
                        const Array<float> &materials, const nb::list &emitters,
-                       const nb::dict &camera, const nb::dict &film, bool hide_emitters) {
+                       const nb::dict &camera, const nb::dict &film, bool hide_emitters,
+                       const std::optional<Array<float>> &uvs, const nb::list &textures,
+                       const std::optional<Array<uint32_t>> &material_textures) {
     SceneData scene;
     scene.tree = tree.tree;
     scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
     scene.normals = rows<Vec3f>(normals, "normals");
+    if (uvs)
+        scene.uvs = rows<Vec2f>(*uvs, "uvs");
+    scene.textures = textures_from(textures);
     scene.materials = materials_from(materials);
+    add_textures(scene.materials, material_textures, scene.textures.size());
     for (size_t i = 0; i < shapes.size(); ++i)
         scene.shapes.push_back(
             shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
@@ -191,6 +228,7 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
     scene.hide_emitters = hide_emitters;
     check_shapes(scene);
     check_vertices(scene);
+    check_textures(scene);
     return {std::make_shared<const PreparedScene>(std::move(scene))};
 }
 
@@ -265,15 +303,22 @@ void bind_scene(nb::module_ &m) {
         m, "Scene",
         "A scene as the native renderer knows it: a tree and plain data, "
         "read once and never changed.")
-        .def(
-            nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
-            nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"), nb::arg("camera"),
-            nb::arg("film"), nb::arg("hide_emitters") = false,
-            "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
-            "vertex normals. normals: float32 (V, 3) or (0, 3). shapes, emitters: lists of "
-            "dicts, camera, film: dicts; keys are the fields of the structs in "
-            "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
-            "Raises ValueError or TypeError for what does not fit together.");
+        .def(nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
+             nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"),
+             nb::arg("camera"), nb::arg("film"), nb::arg("hide_emitters") = false,
+             nb::arg("uvs") = nb::none(), nb::arg("textures") = nb::list(),
+             nb::arg("material_textures") = nb::none(),
+             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
+             "vertex normals or textures. normals: float32 (V, 3) or (0, 3). shapes, "
+             "emitters: lists of "
+             "dicts, camera, film: dicts; keys are the fields of the structs in "
+             "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
+             "uvs: float32 (V, 2), texture coordinates of the vertices. textures: list of "
+             "dicts, fields of the struct in render/texture.h, with the rows of to_uv as "
+             "to_u and to_v, and squares as square_0 and square_1. material_textures: "
+             "uint32 (M, 3), the texture of front, of back, and of the opacity; 2^32 - 1: "
+             "none. "
+             "Raises ValueError or TypeError for what does not fit together.");
 }
 
 } // namespace mlrt

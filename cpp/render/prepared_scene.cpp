@@ -84,6 +84,7 @@ PreparedScene::PreparedScene(SceneData scene_data)
         any_shape_glows |= shape.emitter != NONE;
         shape_materials.push_back(shape.material == NONE ? Material{}
                                                          : data.materials[shape.material]);
+        any_material_is_textured |= shape_materials.back().is_textured();
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 

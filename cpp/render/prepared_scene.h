@@ -28,6 +28,7 @@ struct PreparedScene {
     std::vector<uint32_t> shape_of_face;
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
+    bool any_material_is_textured = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Vec3f center{};                           // of a sphere around all triangles

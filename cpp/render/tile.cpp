@@ -3,6 +3,7 @@
 #include "render/emitter_sampling.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
+#include "render/textured_material.h"
 
 #include <algorithm>
 #include <limits>
@@ -158,7 +159,10 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
 
     LaneBits lanes =
         add_emission(hit, point, shapes, seen_from_front) & to_bits(cos_view != zero);
-    const Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
+    Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
+    if (scene_.any_material_is_textured)
+        albedo = textured_albedo(scene_, {hit.origin, hit.direction, hit.faces, shapes},
+                                 lanes, seen_from_front, albedo);
     lanes &= not_black(albedo);
     if (lanes == 0 || shadows_.empty())
         return;
