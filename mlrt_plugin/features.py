@@ -10,7 +10,8 @@ from .materials import DELTA
 from .scene_arrays import Feature
 from .textures import VARYING
 
-SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
+MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
+SHAPES = MESHES
 BSDFS = ("diffuse", "twosided", "mask", *DELTA)
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)
@@ -76,6 +77,8 @@ def reason_against(element: Element) -> str:
         return "textures of lights are not supported yet"
     if kind == "shape" and textures:
         return "textures that are attributes of a shape are not supported yet"
+    if kind == "shape" and plugin not in MESHES and is_textured(element):
+        return "textures are supported on meshes only so far"
     if plugin == "bitmap" and element.loaded:
         return "a loaded bitmap does not tell its filter_type and wrap_mode"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
@@ -86,6 +89,11 @@ def reason_against(element: Element) -> str:
     ):
         return "only diffuse materials and conductors can be nested in it so far"
     return ""
+
+
+def is_textured(element: Element) -> bool:
+    """Whether there are textures in an element that are not the same everywhere."""
+    return any(e.kind == "texture" and e.plugin in VARYING for e in element.walk())
 
 
 def refuse_refused(scene: Element, sensor: int) -> None:

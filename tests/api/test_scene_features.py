@@ -48,12 +48,18 @@ def test_approximations_are_named(
 UNSUPPORTED = {
     "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
     "constant": {"emitters": '<emitter type="constant" id="sky"/>'},
-    "bitmap": {
+    "volume": {
         "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
-        '<texture type="bitmap" name="reflectance" id="wood">'
-        '<string name="filename" value="wood.png"/></texture></bsdf></shape>'
+        '<texture type="volume" name="reflectance" id="wood">'
+        '<volume type="constvolume" name="volume"/></texture></bsdf></shape>'
     },
-    "conductor": {"shapes": '<shape type="cube"><bsdf type="conductor" id="tin"/></shape>'},
+    "area": {
+        "shapes": '<shape type="rectangle"><emitter type="area" id="screen">'
+        '<texture type="checkerboard" name="radiance"/></emitter></shape>'
+    },
+    "roughconductor": {
+        "shapes": '<shape type="cube"><bsdf type="roughconductor" id="tin"/></shape>'
+    },
     "twosided": {
         "shapes": '<shape type="cube"><bsdf type="twosided"><bsdf type="plastic"/></bsdf>'
         "</shape>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import texture_scenes
 from mitsuba_worker import MitsubaWorker
 
-from mlrt_plugin import prepare
+from mlrt_plugin import import_scene, prepare
 
 SEED = 5
 SPP = 4
@@ -26,17 +27,47 @@ def assets(folder: Path) -> Path:
     return folder
 
 
+def share_of_different_pixels(
+    mitsuba_llvm: MitsubaWorker, assets: Path, name: str, bsdf_samples: int
+) -> float:
+    """Of the native picture and Mitsuba's, beyond rounding."""
+    path = assets / f"{name.replace(' ', '-')}.xml"
+    path.write_text(texture_scenes.SCENES[name])
+    expected = mitsuba_llvm(
+        "render_file", path=str(path), spp=SPP, seed=SEED, bsdf_samples=bsdf_samples
+    )
+    image = prepare(path, shading="native").render(spp=SPP, seed=SEED).image
+    assert image.shape == expected.shape and expected.max() > 0
+    scale = np.maximum(np.abs(expected).max(axis=-1), 1e-3)
+    error = np.abs(image - expected).max(axis=-1)
+    return float(np.mean(error > ROUNDING * scale))
+
+
 @pytest.mark.parametrize("name", texture_scenes.SCENES)
 def test_picture_equals_mitsubas(
     mitsuba_llvm: MitsubaWorker, assets: Path, name: str
 ) -> None:
-    path = assets / f"{name.replace(' ', '-')}.xml"
-    path.write_text(texture_scenes.SCENES[name])
-    expected = mitsuba_llvm("render_file", path=str(path), spp=SPP, seed=SEED)
-    prepared = prepare(path, shading="native")
-    image = prepared.render(spp=SPP, seed=SEED).image
-    assert image.shape == expected.shape
-    scale = np.maximum(np.abs(expected).max(axis=-1), 1e-3)
-    error = np.abs(image - expected).max(axis=-1)
     allowed = next((v for k, v in EDGES.items() if name.startswith(k)), 0.001)
-    assert np.mean(error > ROUNDING * scale) <= allowed
+    assert share_of_different_pixels(mitsuba_llvm, assets, name, 0) <= allowed
+
+
+@pytest.mark.parametrize("name", ["masks", "black materials"])
+def test_bsdf_samples_find_no_lamps(
+    mitsuba_llvm: MitsubaWorker, assets: Path, name: str
+) -> None:
+    assert share_of_different_pixels(mitsuba_llvm, assets, name, 1) <= 0.001
+
+
+@pytest.mark.parametrize(
+    "name", ["bilinear repeat", "nearest mirror", "images", "attributes", "masks"]
+)
+def test_textures_make_a_difference(assets: Path, name: str) -> None:
+    """Without them the comparison above would fail, so it is not one of blank surfaces."""
+    path = assets / "changed.xml"
+    path.write_text(texture_scenes.SCENES[name])
+    arrays = import_scene(path)
+    plain = dataclasses.replace(arrays, textures=(), material_textures=None)
+    images = [prepare(a).render(spp=SPP, seed=SEED).image for a in (arrays, plain)]
+    scale = np.maximum(images[0].max(axis=-1), 1e-3)
+    error = np.abs(images[1] - images[0]).max(axis=-1)
+    assert np.mean(error > 100 * ROUNDING * scale) > 0.02
