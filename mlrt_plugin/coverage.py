@@ -61,7 +61,7 @@ REMARKS = {
     ("bsdf", "mask"): "of native materials; shadow rays stop at it, as in `direct`; by "
     "Mitsuba where BSDF samples can find lights through it",
     **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in DELTA},
-    ("texture", "bitmap"): "on materials; on lights, and of loaded scenes, by Mitsuba",
+    ("texture", "bitmap"): "on materials; on lights by Mitsuba",
     ("texture", "checkerboard"): "on materials; on lights by Mitsuba",
     ("texture", "mesh_attribute"): "on materials; on lights by Mitsuba",
     ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",

@@ -79,8 +79,6 @@ def reason_against(element: Element) -> str:
         return "textures that are attributes of a shape are not supported yet"
     if kind == "shape" and plugin not in MESHES and is_textured(element):
         return "textures are supported on meshes only so far"
-    if plugin == "bitmap" and element.loaded:
-        return "a loaded bitmap does not tell its filter_type and wrap_mode"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(

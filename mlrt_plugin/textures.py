@@ -8,13 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import drjit as dr
 import numpy as np
-import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
+from .loaded_bitmaps import asking, decoded_bytes, is_nearest, wrap_mode
 from .texture_arrays import (
     AttributeTexture,
     BitmapTexture,
@@ -143,9 +142,10 @@ def read_bitmap(texture: Any, element: Element, scalar: bool) -> BitmapTexture:
     to_u, to_v = to_uv_rows(parts["to_uv"], element)
     texels = np.array(parts["data"])
     texels = texels.reshape(*parts["data"].shape)
+    ask = asking(texture, texels, np.array([to_u, to_v], np.float64))
     decoded = None
     if texels.dtype == np.uint8:
-        decoded = decoded_bytes(texture, texels, np.array([to_u, to_v], np.float64))
+        decoded = decoded_bytes(ask, texels)
     else:
         texels = texels.astype(np.float32)
         broken = int(np.count_nonzero(~np.isfinite(texels).all(axis=2)))
@@ -155,6 +155,11 @@ def read_bitmap(texture: Any, element: Element, scalar: bool) -> BitmapTexture:
                 f"{element} has {broken} NaN or infinite pixels: repair its image "
                 f"{file}".rstrip()
             )
+    nearest = str(element.properties.get("filter_type", "bilinear")) == "nearest"
+    wrap = str(element.properties.get("wrap_mode", "repeat"))
+    if element.loaded:
+        values = texels if decoded is None else decoded[texels]
+        nearest, wrap = is_nearest(ask, values), wrap_mode(ask, values)
     if scalar and texels.shape[2] == 3:
         # Interpolation and luminance are linear both, so their order does not matter.
         linear = texels if decoded is None else decoded[texels]
@@ -164,39 +169,13 @@ def read_bitmap(texture: Any, element: Element, scalar: bool) -> BitmapTexture:
         width=width,
         height=height,
         channels=channels,
-        nearest=str(element.properties.get("filter_type", "bilinear")) == "nearest",
-        wrap=str(element.properties.get("wrap_mode", "repeat")),
+        nearest=nearest,
+        wrap=wrap,
         to_u=to_u,
         to_v=to_v,
         texels=np.ascontiguousarray(texels),
         decoded=decoded,
     )
-
-
-def decoded_bytes(
-    texture: Any, texels: npt.NDArray[np.uint8], to_uv: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float32]:
-    """What the bytes of an image stand for: (256,) float32.
-
-    Mitsuba keeps to itself whether they are sRGB, and is asked for the pixel that tells
-    most about it.
-    """
-    linear = (np.arange(256, dtype=np.float32) * np.float32(1 / 255)).astype(np.float32)
-    to_linear: Any = dr.srgb_to_linear
-    srgb = np.array([float(to_linear(float(v))) for v in linear], np.float32)
-    height, width, channels = texels.shape
-    telling = int(np.argmax((linear - srgb)[texels]))
-    pixel, channel = divmod(telling, channels)
-    row, column = divmod(pixel, width)
-    centre = np.array([(column + 0.5) / width, (row + 0.5) / height])
-    u, v = np.linalg.solve(to_uv[:, :2], centre - to_uv[:, 2])
-    module = objects.variant_module(texture)
-    surface = module.SurfaceInteraction3f()
-    surface.uv = module.Point2f(float(u), float(v))
-    answer = np.asarray(texture.eval(surface), np.float64).reshape(-1)[channel]
-    byte = texels[row, column, channel]
-    is_srgb = abs(answer - srgb[byte]) < abs(answer - linear[byte])
-    return srgb if is_srgb else linear
 
 
 def read_attribute(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mitsuba as mi
 import pytest
 import texture_scenes
 from plugin_scenes import bsdf, number, scene, text, texture
@@ -140,11 +139,3 @@ def test_lights_that_bsdf_samples_find_are_left_to_mitsuba(
             assert choice.path == "native" or f"'{material}'" in choice.reason
     hittable = (texture_scenes.PANEL, direct.format(""))
     assert {key for key, path in paths.items() if path == "mitsuba"} == {hittable}
-
-
-def test_loaded_bitmaps_are_not_taken_for_repeated_ones(assets: Path) -> None:
-    body = mesh("quad.obj", diffuse(image("reflectance", "image.png")))
-    path = scene_path(assets, scene(body, texture_scenes.ONLY_LAMP))
-    features = summarise(mi.load_file(str(path), optimize=False)).features
-    reasons = {f.reason for f in features if not f.native}
-    assert len(reasons) == 1 and "wrap_mode" in reasons.pop()
