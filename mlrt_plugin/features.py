@@ -86,6 +86,8 @@ def reason_against(element: Element) -> str:
         for child in element.children_of("bsdf")
     ):
         return "only diffuse materials and conductors can be nested in it so far"
+    if plugin == "mask" and any(c.plugin == "mask" for c in element.children_of("bsdf")):
+        return "a mask in a mask is not supported yet"
     return ""
 
 

@@ -98,7 +98,7 @@ class MaterialTable:
             return Material(material.front, material.back, number)
         raise UnsupportedFeature(
             f"bsdf '{plugin}' of {surface.name} is not supported: only diffuse, twosided, "
-            f"mask and {', '.join(DELTA)} are so far"
+            f"mask, {', '.join(DELTA)} are so far"
         )
 
     def _side(self, reflectance: Any, element: Element, surface: Surface) -> Side:

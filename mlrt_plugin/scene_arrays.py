@@ -183,3 +183,6 @@ class SceneArrays:
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):
             array.setflags(write=False)
+        for optional in (self.material_textures, self.uvs):
+            if optional is not None:
+                optional.setflags(write=False)

@@ -64,6 +64,10 @@ UNSUPPORTED = {
         "shapes": '<shape type="cube"><bsdf type="twosided"><bsdf type="plastic"/></bsdf>'
         "</shape>"
     },
+    "mask": {
+        "shapes": '<shape type="cube"><bsdf type="mask"><bsdf type="mask">'
+        '<bsdf type="diffuse"/></bsdf></bsdf></shape>'
+    },
     "thinlens": {"sensor": scene_files.SENSOR.replace("perspective", "thinlens")},
     "mitchell": {
         "sensor": scene_files.SENSOR.replace(
