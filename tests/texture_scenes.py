@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -89,6 +90,50 @@ def attribute_ply(
         lines.append(" ".join(str(x) for x in values))
     last = ["3 0 1 2", *(str(x) for row in face_values for x in row)]
     return "\n".join([*lines, " ".join(last)]) + "\n"
+
+
+def matte_living_room(path: Path) -> str:
+    """The scene living-room with a lamp in it, its rough materials made diffuse and metals
+    smooth; what is left are photographs as textures, and leaves cut out by one."""
+
+    def matte(match: re.Match[str]) -> str:
+        colour = re.search(
+            r'<texture name="diffuse_reflectance".*?</texture>'
+            r'|<(rgb|spectrum) name="diffuse_reflectance"[^>]*/>',
+            match.group(0),
+            re.DOTALL,
+        )
+        assert colour is not None
+        inside = colour.group(0).replace("diffuse_reflectance", "reflectance")
+        return f'<bsdf type="diffuse">{inside}</bsdf>'
+
+    def without(kind: str, plugin: str, text: str) -> str:
+        return re.sub(rf'<{kind} type="{plugin}".*?</{kind}>', "", text, flags=re.DOTALL)
+
+    content = path.read_text()
+    for name in ("models", "textures"):
+        content = content.replace(f'value="{name}/', f'value="{path.parent}/{name}/')
+    content = without("emitter", "envmap", without("integrator", "path", content))
+    content = re.sub(
+        r'<bsdf type="roughplastic">.*?</bsdf>', matte, content, flags=re.DOTALL
+    )
+    content = content.replace('<bsdf type="roughconductor"', '<bsdf type="conductor"')
+    content = re.sub(
+        r'(<bsdf type="conductor"[^>]*>).*?</bsdf>',
+        r"\1</bsdf>",
+        content,
+        flags=re.DOTALL,
+    )
+    for name, size in (("width", 192), ("height", 108)):
+        content = re.sub(
+            rf'name="{name}" value="[^"]*"', f'name="{name}" value="{size}"', content
+        )
+    lamp = LAMP.replace('x="1.5" y="4" z="4"', 'x="0" y="2.2" z="0"')
+    return content.replace("</scene>", f"{lamp}{DIRECT_WITHOUT}</scene>")
+
+
+DIRECT_WITHOUT = """<integrator type="direct"><integer name="bsdf_samples" value="0"/>
+</integrator>"""
 
 
 def image(name: str, file: str, more: str = "") -> str:
