@@ -55,6 +55,7 @@ REMARKS = {
     ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
     ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
+    ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "

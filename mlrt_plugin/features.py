@@ -10,7 +10,7 @@ from .scene_arrays import Feature
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
 BSDFS = ("diffuse", "twosided")
-EMITTERS = ("point", "spot", "directional", "area")
+EMITTERS = ("point", "spot", "directional", "area", "constant", "envmap")
 SENSORS = ("perspective",)
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
@@ -68,6 +68,8 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin == "envmap" and element.properties.get("mis_compensation", False):
+        return "mis_compensation counts on BSDF samples, which are not taken"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(

@@ -30,8 +30,8 @@ MISSING = {
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
 NO_BSDF_SAMPLES = (
-    "BSDF samples are not taken, so area lights are noisier or less noisy than in Mitsuba; "
-    "the expected image is the same"
+    "BSDF samples are not taken, so lights that have an area or are all around are noisier "
+    "or less noisy than in Mitsuba; the expected image is the same"
 )
 OWN_PARAMETERS = (
     "hide_emitters",
@@ -204,7 +204,7 @@ def integrator_warnings(
             "raise the samples per pixel instead"
         )
     if lighting.bsdf_samples > 0 and any(
-        f.kind == "emitter" and f.plugin == "area" for f in features
+        f.kind == "emitter" and f.plugin in ("area", "constant", "envmap") for f in features
     ):
         warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
     return warnings

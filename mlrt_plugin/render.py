@@ -229,6 +229,7 @@ def prepare(
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
+        arrays.environment if arrays.environment.size else None,
     )
     return PreparedScene(
         arrays,

@@ -66,6 +66,13 @@ def emitter_of(emitter: Any, kind: str, shape: int | None) -> dict[str, Any]:
         "type": kind,
         "sampling_weight": float(params["sampling_weight"]),
     }
+    if kind == "constant":
+        (result["radiance"],) = values_of(emitter, "radiance.value")
+        return result
+    if kind == "envmap":
+        result["radiance"] = [float(params["scale"])] * 3
+        result["axes"] = np.array(params["to_world"].matrix, np.float64)[:3, :3].T
+        return result
     if kind == "area":
         (result["radiance"],) = values_of(emitter, "radiance.value")
         result["shape"] = shape
@@ -155,6 +162,10 @@ def scene_arguments(description: dict[str, Any], **more: Any) -> dict[str, Any]:
         "film": film_of(sensor.film(), description["sensor"]["film"]),
         "hide_emitters": False,
     }
+    for emitter in emitters:
+        if kinds.get(emitter.id()) == "envmap":
+            padded = np.array(mi.traverse(emitter)["data"], np.float32)
+            arguments["environment"] = padded[:, 1:-1].copy()
     return arguments | more
 
 

@@ -118,6 +118,18 @@ inline FloatPacket arc_cosine(const FloatPacket &a) {
 inline FloatPacket sine(const FloatPacket &a) {
     return drjit::sin(a);
 }
+inline FloatPacket cosine(const FloatPacket &a) {
+    return drjit::cos(a);
+}
+
+// The angle of the point (x, y), from -pi to pi.
+inline FloatPacket arc_tangent(const FloatPacket &y, const FloatPacket &x) {
+    return drjit::atan2(y, x);
+}
+
+inline FloatPacket floor(const FloatPacket &a) {
+    return drjit::floor(a);
+}
 
 // a * b + c, rounded once: every processor we build for has it as an instruction.
 template <typename T>
@@ -126,6 +138,11 @@ T fused(const T &a, const T &b, const T &c) {
         return std::fma(a, b, c);
     else
         return drjit::fmadd(a, b, c);
+}
+
+// a where t is 0, b where it is 1, and linear between them, rounded as Mitsuba does it.
+inline FloatPacket mix(const FloatPacket &a, const FloatPacket &b, const FloatPacket &t) {
+    return fused(b, t, fused(-a, t, a));
 }
 
 // The size of a with the sign of b.
@@ -226,6 +243,11 @@ Packet load(const Value *values) {
 template <typename Packet, typename Value>
 void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
+}
+
+// values[indices[lane]] in each lane; indices below 2^31.
+inline FloatPacket gather(const float *values, const UIntPacket &indices) {
+    return drjit::gather<FloatPacket>(values, indices);
 }
 
 // Lanes 0 to 7 to one place, lanes 8 to 15 to another.

@@ -61,6 +61,8 @@ void TileRenderer::render(const PixelGroup &group) {
     samples_.generate(group);
     make_room();
     trace_camera_rays(group);
+    if (scene_.environment.exists() && !scene_.data.hide_emitters)
+        add_background();
     shade_hits();
     pass_hidden_emitters();
     add_reflected_light();
@@ -106,6 +108,23 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     trace_closest(*scene_.data.tree, rays, options_,
                   HitGroup{wants_distances ? t_.data() : nullptr, primitive_.data()},
                   counters_.primary, is_square ? &tile : nullptr);
+}
+
+// What rays see that meet nothing.
+void TileRenderer::add_background() {
+    for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
+        const LaneBits misses =
+            to_bits(load<UIntPacket>(&primitive_[first]) == UIntPacket(NO_PRIMITIVE));
+        if (misses == 0)
+            continue;
+        const auto mask = from_bits<FloatPacket>(misses);
+        const Vec3<FloatPacket> light =
+            scene_.environment.radiance({load<FloatPacket>(samples_.direction(0) + first),
+                                         load<FloatPacket>(samples_.direction(1) + first),
+                                         load<FloatPacket>(samples_.direction(2) + first)});
+        for (int k = 0; k < 3; ++k)
+            store(&values_[size_t(k)][first], select(mask, light[k], FloatPacket(0.0f)));
+    }
 }
 
 void TileRenderer::shade_hits() {

@@ -83,6 +83,7 @@ private:
 
     void make_room();
     void trace_camera_rays(const PixelGroup &group);
+    void add_background();
     void shade_hits();
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);

@@ -47,7 +47,11 @@ def test_approximations_are_named(
 
 UNSUPPORTED = {
     "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
-    "constant": {"emitters": '<emitter type="constant" id="sky"/>'},
+    "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
+    "envmap": {
+        "emitters": '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
+        '<boolean name="mis_compensation" value="true"/></emitter>'
+    },
     "bitmap": {
         "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
         '<texture type="bitmap" name="reflectance" id="wood">'

@@ -42,7 +42,7 @@ def test_picture_equals_mitsubas(
     assert share_of_different_pixels(image, expected, 1e-3) < 0.001
 
 
-@pytest.mark.parametrize("name", ["several", "mirrored"])
+@pytest.mark.parametrize("name", ["several", "mirrored", "large sky"])
 def test_hidden_emitters(mitsuba_llvm: MitsubaWorker, folder: Path, name: str) -> None:
     expected = mitsuba_llvm("render", scene=name, spp=SPP, seed=SEED, hide_emitters=True)
     description = render_scenes.SCENES[name](folder)

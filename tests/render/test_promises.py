@@ -34,7 +34,7 @@ def all_pictures(answer: dict[str, Any]) -> bytes:
     )
 
 
-@pytest.mark.parametrize("name", ["several", "gaussian border", "crop"])
+@pytest.mark.parametrize("name", ["several", "gaussian border", "crop", "mirrored sky"])
 def test_picture_does_not_depend_on_threads(folder: Path, threads: None, name: str) -> None:
     scene = core_scene(render_scenes.SCENES[name](folder))
     pictures = set()
@@ -44,7 +44,7 @@ def test_picture_does_not_depend_on_threads(folder: Path, threads: None, name: s
     assert len(pictures) == 1
 
 
-@pytest.mark.parametrize("name", ["several", "gaussian border", "crop"])
+@pytest.mark.parametrize("name", ["several", "gaussian border", "crop", "mirrored sky"])
 def test_picture_does_not_depend_on_options(folder: Path, name: str) -> None:
     scene = core_scene(render_scenes.SCENES[name](folder))
     pictures = {}

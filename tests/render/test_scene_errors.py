@@ -38,6 +38,10 @@ def last_face_of_normals(arguments: Arguments) -> None:
     arguments["faces"][-1, 2] = 100_000
 
 
+def two_skies(arguments: Arguments) -> None:
+    arguments["emitters"][:2] = [{"type": "constant", "radiance": [1, 1, 1]}] * 2
+
+
 BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
     "missing key": (changed("camera.axes", KeyError), ValueError, r"camera lacks 'axes'"),
     "unknown key": (changed("film.widht", 3), ValueError, r"film has no field 'widht'"),
@@ -108,6 +112,32 @@ BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
         changed("materials", np.zeros((2, 3), np.float32)),
         ValueError,
         r"\(M, 2, 3\)",
+    ),
+    "picture without a sky": (
+        changed("environment", np.zeros((3, 2, 3), np.float32)),
+        ValueError,
+        "if and only if",
+    ),
+    "sky without a picture": (
+        changed("emitters.0", {"type": "envmap", "radiance": [1, 1, 1]}),
+        ValueError,
+        "if and only if",
+    ),
+    "two skies": (two_skies, ValueError, "at most one"),
+    "flat sky": (
+        changed("emitters.0.axes", [[1, 0, 0], [0, 1, 0], [1, 1, 0]]),
+        ValueError,
+        "linearly independent",
+    ),
+    "picture shape": (
+        changed("environment", np.zeros((2, 2, 3), np.float32)),
+        ValueError,
+        r"\(H, W, 3\)",
+    ),
+    "picture of NaN": (
+        changed("environment", np.full((3, 2, 3), np.nan, np.float32)),
+        ValueError,
+        "finite",
     ),
     "dark material": (
         changed("materials", np.full((6, 2, 3), -1, np.float32)),
