@@ -66,7 +66,7 @@ def read_emitter(
         scale = objects.number(parts["scale"])
         if not (scale >= 0 and math.isfinite(scale)):
             raise SceneError(f"{name} has scale = {scale:g}: it must be at least 0")
-        check_invertible(to_world, name)
+        objects.check_invertible(to_world, name)
         first, second, third = (objects.vec3(column) for column in to_world[:3, :3].T)
         return Emitter(
             "envmap",
@@ -118,22 +118,6 @@ def read_environment(emitter: Any, name: str) -> npt.NDArray[np.float32]:
     return picture
 
 
-def check_invertible(to_world: npt.NDArray[np.float64], name: str) -> None:
-    """Raises SceneError for a matrix that is not finite or flattens what it moves."""
-    check_finite(to_world, name)
-    stretch = np.linalg.svd(to_world[:3, :3], compute_uv=False)
-    if stretch[2] <= 1e-12 * stretch[0]:
-        raise SceneError(
-            f"{name} has a singular to_world, which flattens it: no scale may be 0"
-        )
-
-
-def check_finite(to_world: npt.NDArray[np.float64], name: str) -> None:
-    """Raises SceneError for a matrix that holds NaN or infinity."""
-    if not np.isfinite(to_world).all():
-        raise SceneError(f"{name} has a to_world with NaN or infinite entries: repair it")
-
-
 def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> None:
     """Raises SceneError for a scene in which light cannot fall off.
 
@@ -169,7 +153,7 @@ def unit_axis(to_world: npt.NDArray[np.float64], name: str) -> Vec3:
     SceneError if it is not finite.
     """
     axes = to_world[:3, :3]
-    check_finite(to_world, name)
+    objects.check_finite(to_world, name)
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-3):
         raise UnsupportedFeature(
             f"{name} has a to_world that scales, which is not supported: use a rotation "

@@ -80,7 +80,12 @@ class Emitter:
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera that looks along the third of its axes; the first points left."""
+    """A camera that looks along the third of its axes; the first points left.
+
+    type: perspective, thinlens or orthographic. half_extent: of the last, half the width of
+    the film, and what would be half its height if it were square, in scene units.
+    samples_time: whether a random number of each sample is spent on its time.
+    """
 
     origin: Vec3
     axes: tuple[Vec3, Vec3, Vec3]
@@ -88,6 +93,20 @@ class Camera:
     near_clip: float = 0.01
     far_clip: float = 1e4
     principal_point_offset: Vec2 = (0.0, 0.0)
+    type: str = "perspective"
+    half_extent: Vec2 = (1.0, 1.0)
+    aperture_radius: float = 0.0
+    focus_distance: float = 1.0
+    samples_time: bool = False
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """Where random numbers come from: ``type`` is that of a plugin. Without jitter samples
+    lie in the middle of their cells."""
+
+    type: str = "independent"
+    jitter: bool = True
 
 
 @dataclass(frozen=True)
@@ -164,6 +183,7 @@ class SceneArrays:
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
     each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
     each shape had a vertex that is not finite; they are points now.
+    sampler: of the sensor.
     environment: (H, W, 3) float32, linear RGB radiance in latitude and longitude, the first
     row at the pole; (0, 0, 3) if no emitter is an `envmap`.
     """
@@ -183,6 +203,7 @@ class SceneArrays:
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
     not_finite_faces: tuple[int, ...] = ()
+    sampler: Sampler = Sampler()
     environment: npt.NDArray[np.float32] = field(default_factory=no_environment)
 
     def __post_init__(self) -> None:

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 
 from . import camera as cameras
-from . import elements, emitters, features, integrators, meshes, parsing
+from . import elements, emitters, features, integrators, meshes, parsing, samplers
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
@@ -128,7 +128,6 @@ def import_scene(
     if obstacle:
         raise UnsupportedFeature(obstacle)
     warnings = integrators.integrator_warnings(found, lighting, native=True)
-    warnings += features.native_warnings(found)
     if not is_loaded_scene(scene):
         check_transforms(parsed)
         check_files(parsed)
@@ -245,7 +244,7 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
         transform = element.properties.get("to_world")
         if transform is None:
             continue
-        emitters.check_invertible(objects.matrix(transform), str(element))
+        objects.check_invertible(objects.matrix(transform), str(element))
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
@@ -316,7 +315,13 @@ def collect(
     film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
-    sampler = sensor.sampler()
+    source = sensor.sampler()
+    element = names.get(source.id())
+    sampler, base_seed = samplers.read_sampler(
+        source, name_of(source), element.properties if element else {}
+    )
+    camera = cameras.read_camera(sensor, name_of(sensor))
+    ignored += cameras.camera_warnings(camera, name_of(sensor))
     return SceneArrays(
         vertices=geometry.vertices,
         faces=geometry.faces,
@@ -339,15 +344,16 @@ def collect(
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),
-        camera=cameras.read_camera(sensor, name_of(sensor)),
+        camera=camera,
         film=film,
         lighting=lighting,
-        spp=int(sampler.sample_count()),
-        base_seed=int(objects.described(sampler, "base_seed", "0")),
+        spp=int(source.sample_count()),
+        base_seed=base_seed,
         features=found,
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
+        sampler=sampler,
         environment=environment,
     )
 

@@ -62,7 +62,7 @@ def film(width: int = 64, height: int = 48, rfilter: str = "box", **more: Any) -
 
 
 def sensor(film_dict: SceneDict, **more: Any) -> SceneDict:
-    return {
+    result = {
         "type": "perspective",
         "fov": 45,
         "to_world": look_at((0.3, 1.2, 4), (0, 0.6, 0)),
@@ -70,6 +70,7 @@ def sensor(film_dict: SceneDict, **more: Any) -> SceneDict:
         "sampler": {"type": "independent"},
         **more,
     }
+    return {key: value for key, value in result.items() if value is not None}
 
 
 def write_ball(folder: Path, normals: bool = True) -> str:
@@ -314,6 +315,52 @@ SCENES: Mapping[str, Callable[[Path], SceneDict]] = {
                 crop_width=50,
                 crop_height=41,
             )
+        ),
+    ),
+    "lens": lambda folder: room(
+        folder,
+        light=rectangle_light(),
+        sensor=sensor(
+            film(70, 45, "gaussian"),
+            type="thinlens",
+            aperture_radius=0.15,
+            focus_distance=3.7,
+            near_clip=0.5,
+        ),
+    ),
+    "lens in a crop": lambda folder: room(
+        folder,
+        light=sky_light(folder),
+        sensor=sensor(
+            film(70, 45, crop_offset_x=11, crop_offset_y=7, crop_width=40, crop_height=30),
+            type="thinlens",
+            aperture_radius=0.3,
+            focus_distance=4.2,
+            fov_axis="y",
+        ),
+    ),
+    "parallel": lambda folder: room(
+        folder,
+        light=rectangle_light(),
+        sensor=sensor(
+            film(70, 45),
+            type="orthographic",
+            fov=None,
+            to_world=transform(look_at((0.3, 1.2, 4), (0, 0.6, 0)), scale(2.4, 2.1, 1)),
+        ),
+    ),
+    "parallel along an axis": lambda folder: room(
+        folder,
+        light=sky_light(folder),
+        sensor=sensor(
+            film(50, 64, "tent"),
+            type="orthographic",
+            fov=None,
+            to_world=transform(
+                translate(0.2, 1.1, 5), rotate((0, 1, 0), 180), scale(2, 2, 3)
+            ),
+            near_clip=1.3,
+            far_clip=4.6,
         ),
     ),
     "offset camera": lambda folder: room(

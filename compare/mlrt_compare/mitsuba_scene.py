@@ -31,13 +31,13 @@ def load_mitsuba_scene(
     settings: Settings,
     variant: str,
     integrator: Mapping[str, Any] | None = None,
-    keep_sampler: bool = False,
+    keep_sampler: bool = True,
 ) -> MitsubaScene:
     """As mi.load_file does, with sampler, film size and integrator replaced; sets the
     variant.
 
     integrator: what to render, by default `direct` with one emitter sample.
-    keep_sampler: whether to take the scene's sampler, by default `independent`. Raises
+    keep_sampler: whether to take the scene's sampler, not `independent`. Raises
     SceneError, one sentence, if Mitsuba cannot load the scene.
     """
     mi.set_variant(variant)
@@ -78,8 +78,8 @@ def _loaded(
 
 
 def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
-    """Gives every sensor the independent sampler and the wanted size; tells
-    hide_emitters."""
+    """Gives every sensor the wanted size, and the independent sampler if its own is not to
+    be kept; tells hide_emitters."""
     hide_emitters = False
     for node in state.nodes:
         if node.type == mi.ObjectType.Sampler and not keep_sampler:

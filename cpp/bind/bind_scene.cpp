@@ -244,7 +244,21 @@ Camera camera_from(nb::handle dict) {
     Camera camera;
     camera.origin = fields.vector("origin");
     camera.axes = fields.vectors("axes");
-    camera.tan_half_fov_x = fields.number("tan_half_fov_x");
+    camera.type = fields.choice<CameraType>("type",
+                                            {{"perspective", CameraType::perspective},
+                                             {"thinlens", CameraType::thinlens},
+                                             {"orthographic", CameraType::orthographic}},
+                                            CameraType::perspective);
+    const bool lens = camera.type == CameraType::thinlens;
+    camera.tan_half_fov_x = camera.type == CameraType::orthographic
+                                ? fields.number("tan_half_fov_x", 1)
+                                : fields.number("tan_half_fov_x");
+    camera.half_extent = fields.vector2("half_extent", {1, 1});
+    camera.aperture_radius =
+        lens ? fields.number("aperture_radius") : fields.number("aperture_radius", 0);
+    camera.focus_distance =
+        lens ? fields.number("focus_distance") : fields.number("focus_distance", 1);
+    camera.samples_time = fields.boolean("samples_time", false);
     camera.near_clip = fields.number("near_clip");
     camera.far_clip = fields.number("far_clip");
     camera.principal_point_offset = fields.vector2("principal_point_offset", {});
@@ -255,6 +269,12 @@ Camera camera_from(nb::handle dict) {
                 refuse_value("camera['axes'] must be orthogonal unit vectors.");
     if (!(camera.tan_half_fov_x > 0))
         refuse_value("camera['tan_half_fov_x'] must be positive.");
+    if (!(camera.half_extent.x > 0 && camera.half_extent.y > 0))
+        refuse_value("camera['half_extent'] must be positive.");
+    if (!(camera.aperture_radius >= 0))
+        refuse_value("camera['aperture_radius'] must not be negative.");
+    if (!(camera.focus_distance > 0))
+        refuse_value("camera['focus_distance'] must be positive.");
     if (!(camera.near_clip >= 0 && camera.far_clip > camera.near_clip))
         refuse_value(
             "camera['far_clip'] must exceed camera['near_clip'], which must not be "

@@ -62,12 +62,21 @@ struct EnvironmentPicture {
     std::vector<float> rgb;         // row by row
 };
 
-// A pinhole camera (Mitsuba's `perspective`): looks along +z of its frame, x points left.
+enum class CameraType : uint32_t { perspective, thinlens, orthographic };
+
+// A camera looks along +z of its frame, x points left.
 struct Camera {
+    CameraType type = CameraType::perspective;
     Vec3f origin{}; // world space
     std::array<Vec3f, 3> axes{
-        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};   // camera x, y, z in world space
-    float tan_half_fov_x = 1;                 // of the whole film, crop not considered
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // camera x, y, z in world space
+    float tan_half_fov_x = 1; // of the whole film, crop not considered; not orthographic
+    // orthographic: half the width of the film, and what would be half its height if it
+    // were square, in scene units
+    Vec2f half_extent{1, 1};
+    float aperture_radius = 0; // thinlens: scene units
+    float focus_distance = 1;  // thinlens: along the camera's z
+    bool samples_time = false; // whether a number of each sample is spent on its time
     float near_clip = 0.01f, far_clip = 1e4f; // distances along the camera's z
     Vec2f principal_point_offset{};           // in fractions of the film
 };

@@ -12,6 +12,7 @@
 #include "render/sampler.h"
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
+#include "render/spread_samples.h"
 #include "render/surface.h"
 
 #include <cstdint>
@@ -54,10 +55,17 @@ struct RenderCounters {
     Counters primary, shadow;
 };
 
+// How samples are taken.
+struct Sampling {
+    Sampler sampler;
+    uint32_t emitter_samples = 1; // of each camera sample
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const TraceOptions &options, ShadowOffset offset, TileTarget target);
+                 const Sampling &sampling, const TraceOptions &options, ShadowOffset offset,
+                 TileTarget target);
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
 
@@ -72,7 +80,6 @@ private:
         LaneBits lanes = 0;
         UIntPacket ray, faces;
         Vec3<FloatPacket> origin, direction;
-        FloatPacket light_x, light_y;
     };
 
     // Camera rays that go on behind an emitter that is to be hidden.
@@ -88,6 +95,9 @@ private:
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
+    void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                            LaneBits lanes, const FloatPacket &cos_view,
+                            const Vec3<FloatPacket> &albedo, uint32_t sample);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
     void pass_hidden_emitters();
@@ -98,6 +108,7 @@ private:
 
     const PreparedScene &scene_;
     const SampleStreams &streams_;
+    uint32_t emitter_samples_;
     TraceOptions options_;
     ShadowOffset offset_;
     TileTarget target_;
