@@ -145,18 +145,21 @@ void TileRenderer::shade_hits() {
         hit.ray = UIntPacket(uint32_t(first)) + lane_number;
         for (int k = 0; k < 3; ++k)
             hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
-        SurfacePoint<FloatPacket> point;
-        if (scene_.plane.has_common_origin()) {
-            point = hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces,
-                                 hit.lanes);
-        } else {
-            for (int k = 0; k < 3; ++k)
-                hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
-            point = hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes);
-        }
+        hit.first = first;
+        const SurfacePoint<FloatPacket> point = surfaces_of(hit);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
+}
+
+// The surfaces that camera rays hit, whose origins are filled in if they are not common.
+SurfacePoint<FloatPacket> TileRenderer::surfaces_of(HitPacket &hit) const {
+    if (scene_.plane.has_common_origin())
+        return hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces,
+                            hit.lanes);
+    for (int k = 0; k < 3; ++k)
+        hit.origin[k] = load<FloatPacket>(samples_.origin(k) + *hit.first);
+    return hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes);
 }
 
 void TileRenderer::write_depth_and_normal(const HitPacket &hit,
@@ -200,8 +203,12 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
                                       const SurfacePoint<FloatPacket> &point,
                                       LaneBits lanes, const FloatPacket &cos_view,
                                       const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const FloatPacket zero(0.0f), x = gather(samples_.light_x(sample), hit.ray);
-    const FloatPacket y = gather(samples_.light_y(sample), hit.ray);
+    const auto numbers = [&](const float *of_rays) {
+        return hit.first ? load<FloatPacket>(of_rays + *hit.first)
+                         : gather(of_rays, hit.ray);
+    };
+    const FloatPacket zero(0.0f), x = numbers(samples_.light_x(sample));
+    const FloatPacket y = numbers(samples_.light_y(sample));
     const float part = std::numbers::inv_pi_v<float> / float(emitter_samples_);
     const EmitterChoices choices = choose_emitters(scene_, x);
     for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits lit) {

@@ -16,6 +16,7 @@
 #include "render/surface.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -78,6 +79,7 @@ private:
     // Up to sixteen rays that meet a surface.
     struct HitPacket {
         LaneBits lanes = 0;
+        std::optional<size_t> first; // ray in lane 0, if the others follow it
         UIntPacket ray, faces;
         Vec3<FloatPacket> origin, direction;
     };
@@ -92,6 +94,7 @@ private:
     void trace_camera_rays(const PixelGroup &group);
     void add_background();
     void shade_hits();
+    SurfacePoint<FloatPacket> surfaces_of(HitPacket &hit) const;
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
