@@ -184,7 +184,7 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
         )
     if lighting.integrator == "mlrt" and lighting.bsdf_samples != 0:
         return (
-            f"{name} takes no BSDF samples natively: set bsdf_samples to 0, or leave it out"
+            f"{name} takes no BSDF sample natively: set bsdf_samples to 0, or leave it out"
         )
     if lighting.emitter_samples > MOST_EMITTER_SAMPLES:
         return (

@@ -113,6 +113,19 @@ BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
         ValueError,
         r"\(M, 2, 3\)",
     ),
+    "no width": (changed("camera.half_extent", [0, 1]), ValueError, "'half_extent'"),
+    "unknown camera": (changed("camera.type", "fisheye"), ValueError, "perspective, thin"),
+    "lens without size": (
+        changed("camera.type", "thinlens"),
+        ValueError,
+        "camera lacks 'aperture_radius'",
+    ),
+    "negative lens": (
+        changed("camera.aperture_radius", -1),
+        ValueError,
+        "must not be negative",
+    ),
+    "no focus": (changed("camera.focus_distance", 0), ValueError, "'focus_distance'"),
     "picture without a sky": (
         changed("environment", np.zeros((3, 2, 3), np.float32)),
         ValueError,
@@ -197,6 +210,18 @@ BAD_RENDERS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "split": ({"options": {"split_factor": 5}}, ValueError, "4 or 16"),
     "unknown picture": ({"aovs": ["albedo"]}, ValueError, "'albedo'"),
     "progress": ({"progress": 3}, TypeError, "callable"),
+    "unknown sampler": ({"sampler": {"type": "sobol"}}, ValueError, "independent, strat"),
+    "samples of a sampler": (
+        {"sampler": {"type": "stratified"}, "spp": 3},
+        ValueError,
+        "spp = 3",
+    ),
+    "too many samples": (
+        {"sampler": {"type": "ldsampler"}, "spp": 1 << 28},
+        ValueError,
+        "32 bits",
+    ),
+    "no emitter sample": ({"emitter_samples": 0}, ValueError, "from 1 to 256"),
 }
 
 
