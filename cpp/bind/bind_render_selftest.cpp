@@ -46,15 +46,6 @@ std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t 
     return numbers;
 }
 
-nb::dict image_plane_map(const nb::dict &camera, const nb::dict &film) {
-    const ImagePlane plane = image_plane(camera_from(camera), film_from(film));
-    nb::dict result;
-    result["d0"] = array(plane.d0);
-    result["dx"] = array(plane.dx);
-    result["dy"] = array(plane.dy);
-    return result;
-}
-
 Floats3 camera_direction(const nb::dict &camera, const nb::dict &film, float x, float y) {
     return array(image_plane(camera_from(camera), film_from(film)).direction(x, y));
 }
@@ -233,7 +224,6 @@ void bind_render_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("render_selftest", "Parts of the renderer, for tests.");
     s.def("sampler_stream", &sampler_stream, nb::arg("seed"), nb::arg("pixel_count"),
           nb::arg("samples"), nb::arg("pixel"), nb::arg("sample"), nb::arg("dimensions"));
-    s.def("image_plane", &image_plane_map, nb::arg("camera"), nb::arg("film"));
     s.def("camera_direction", &camera_direction, nb::arg("camera"), nb::arg("film"),
           nb::arg("x"), nb::arg("y"));
     s.def("filter_weights", &filter_weights, nb::arg("film"), nb::arg("distances"));

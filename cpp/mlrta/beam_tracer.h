@@ -92,7 +92,7 @@ private:
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
                 output_.set(packet.first_ray, packet.found,
-                            hit_distances(tree_, rays_, packet, counters_),
+                            hit_distances(tree_, rays_, beam_.axes[2], packet, counters_),
                             packet.primitive);
             else
                 output_.set(packet.first_ray, packet.found, packet.primitive);

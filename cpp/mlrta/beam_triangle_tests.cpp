@@ -1,5 +1,6 @@
 #include "mlrta/beam_triangle_tests.h"
 
+#include "base/exactness.h"
 #include "geometry/triangle_test.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
@@ -95,7 +96,7 @@ void BeamTriangleTests<query>::test_triangle(const TriangleForms &forms, uint32_
     LaneBits packets = ((1u << beam_.count) - 1) & ~to_bits(beside);
     if (packets == 0)
         return;
-    const FloatPacket edge_error(forms.edge_error[lane]);
+    const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
     MaskOf<FloatPacket> touched, covered;
     FloatPacket smallest, greatest;
     for (int form = 0; form < 4; ++form) {
@@ -119,8 +120,9 @@ void BeamTriangleTests<query>::test_triangle(const TriangleForms &forms, uint32_
             covered = smallest > edge_error;
         }
     }
-    const FloatPacket highest = fused(greatest, FloatPacket(forms.depth_grow[lane]),
-                                      FloatPacket(forms.depth_error[lane]));
+    const FloatPacket highest = EXACT ? fused(greatest, FloatPacket(forms.depth_grow[lane]),
+                                              FloatPacket(forms.depth_error[lane]))
+                                      : greatest;
     packets &= to_bits(touched & (highest >= load<FloatPacket>(beam_.least)));
     const LaneBits covered_packets = to_bits(covered);
     bool changed = false;
@@ -145,20 +147,22 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
     };
     const FloatPacket depth = value(TriangleForms::DEPTH);
     const FloatPacket error(forms.depth_error[lane]);
-    const FloatPacket highest = fused(depth, FloatPacket(forms.depth_grow[lane]), error);
+    const FloatPacket highest =
+        EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
     LaneBits possible = to_bits(highest >= packet.least);
     LaneBits certain = possible;
     if (!covered) {
         const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-        const FloatPacket edge_error(forms.edge_error[lane]);
+        const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
         possible &= to_bits(smallest >= -edge_error);
         if (possible == 0)
             return false;
-        certain = possible & to_bits(smallest > edge_error);
+        certain = EXACT ? possible & to_bits(smallest > edge_error) : possible;
     } else if (possible == 0) {
         return false;
     }
-    const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
+    const FloatPacket lowest =
+        EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
     const LaneBits nearer =
         certain & to_bits((lowest > packet.greatest) & (highest < packet.nearest));
     if (nearer != 0) {
@@ -173,7 +177,7 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
                                       packet.primitive);
         }
     }
-    if ((possible & ~nearer) != 0)
+    if (EXACT && (possible & ~nearer) != 0)
         decide(packet, possible & ~nearer, certain, primitive);
     beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
     return true;
@@ -244,10 +248,14 @@ void BeamTriangleTests<query>::update_least() {
 template class BeamTriangleTests<Query::closest>;
 template class BeamTriangleTests<Query::any>;
 
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
+FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays, int main_axis,
                           const BeamPacket &packet, Counters &counters) {
     // Fewer lanes of a triangle than this are faster one by one; chosen.
     constexpr int FEW = 3;
+    if constexpr (!EXACT)
+        return 1.0f /
+               (packet.greatest * absolute(load_padded(rays.direction[main_axis],
+                                                       packet.first_ray, rays.count)));
     Vec3<DoublePacket> direction;
     for (int k = 0; k < 3; ++k)
         direction[k] =

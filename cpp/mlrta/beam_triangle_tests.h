@@ -82,9 +82,9 @@ private:
     float far_end_ = 0;
 };
 
-// Distances of the nearest hits that a packet has found; other lanes hold any value. At
-// least one must have found something.
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
+// Distances of the nearest hits that a packet of a beam with this main axis has found;
+// other lanes hold any value. At least one must have found something.
+FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays, int main_axis,
                           const BeamPacket &packet, Counters &counters);
 
 } // namespace mlrt

@@ -1,5 +1,6 @@
 #include "mlrta/triangle_forms.h"
 
+#include "base/exactness.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
 
@@ -65,39 +66,45 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     const Vec3<FloatBlock> va = vertex(0), vb = vertex(1), vc = vertex(2);
     const Vec3<FloatBlock> a = va - o, b = vb - o, c = vc - o;
     const Vec3<FloatBlock> ab = vb - va, bc = vc - vb, ca = va - vc;
-    const Vec3<DoubleBlock> da = to_double(va);
-    const Vec3<DoubleBlock> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
-    const Vec3<FloatBlock> normals[4] = {
-        cross(b, bc),
-        cross(c, ca),
-        cross(a, ab),
-        {FloatBlock(d_normal.x), FloatBlock(d_normal.y), FloatBlock(d_normal.z)}};
-    const FloatBlock volume(dot(da - to_double(o), d_normal));
+    Vec3<FloatBlock> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
+    FloatBlock volume;
+    if constexpr (EXACT) {
+        const Vec3<DoubleBlock> da = to_double(va);
+        const Vec3<DoubleBlock> normal = cross(to_double(vb) - da, to_double(vc) - da);
+        normals[DEPTH] = {FloatBlock(normal.x), FloatBlock(normal.y), FloatBlock(normal.z)};
+        volume = FloatBlock(dot(da - to_double(o), normal));
+    } else {
+        normals[DEPTH] = cross(ca, ab);
+        volume = dot(a, normals[DEPTH]);
+    }
 
-    const FloatBlock size =
-        maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
-    const FloatBlock edge = maximum(largest_component(ab),
-                                    maximum(largest_component(bc), largest_component(ca)));
-    const FloatBlock volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
-                                    (2 * FLOAT_ROUNDOFF) * absolute(volume);
     const FloatBlock inverse = 1.0f / volume;
-    const FloatBlock inverse_size = absolute(inverse);
-    const FloatBlock share = volume_error * inverse_size;
-    const auto safe = (size < LARGEST_SIZE) & (absolute(volume) > SMALLEST_VOLUME) &
-                      (share <= LARGEST_SHARE);
+    const FloatBlock sum(beam.greatest_sum);
     const LaneBits given = (1u << count) - 1;
+    MaskOf<FloatBlock> safe = absolute(volume) > SMALLEST_VOLUME;
+    FloatBlock share, edge_bound, depth_bound;
+    if constexpr (EXACT) {
+        const FloatBlock size = maximum(
+            largest_component(a), maximum(largest_component(b), largest_component(c)));
+        const FloatBlock edge = maximum(
+            largest_component(ab), maximum(largest_component(bc), largest_component(ca)));
+        const FloatBlock volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
+                                        (2 * FLOAT_ROUNDOFF) * absolute(volume);
+        const FloatBlock inverse_size = absolute(inverse);
+        share = volume_error * inverse_size;
+        safe &= (size < LARGEST_SIZE) & (share <= LARGEST_SHARE);
+        edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
+        depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
+                      sum * inverse_size;
+        unsafe = given & ~to_bits(safe);
+    } else {
+        share = edge_bound = depth_bound = FloatBlock(0.0f);
+        unsafe = 0;
+    }
     const LaneBits safe_bits = to_bits(safe) & given;
-    unsafe = given & ~safe_bits;
     possible = 0;
     if (safe_bits == 0)
         return;
-
-    const FloatBlock sum(beam.greatest_sum);
-    const FloatBlock edge_bound =
-        (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
-    const FloatBlock depth_bound =
-        (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) * sum *
-        inverse_size;
     store(edge_error, edge_bound);
 
     const SlopeRectangle &rectangle = beam.rectangle;
