@@ -154,17 +154,22 @@ void BeamPackets::turn_as_rays() {
 void BeamPackets::fit_rectangle() {
     const float c = rectangle.cosine, s = rectangle.sine;
     const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
-    LaneArray<float> lo_p, hi_p, lo_q, hi_q;
-    lo_p.fill(INFINITE);
-    lo_q.fill(INFINITE);
-    hi_p.fill(-INFINITE);
-    hi_q.fill(-INFINITE);
-    least.fill(INFINITE);
+    // Packets that are missing, and lanes that are not active, bound nothing.
+    const FloatPacket none_lo(INFINITE), none_hi(-INFINITE);
+    PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
+    const auto leave_out = [&](uint32_t n) {
+        lo_p[n] = lo_q[n] = least_of[n] = none_lo;
+        hi_p[n] = hi_q[n] = none_hi;
+    };
+    for (uint32_t n = count; n < CAPACITY; ++n)
+        leave_out(n);
     FloatPacket lo_u = INFINITE, hi_u = -INFINITE, lo_v = INFINITE, hi_v = -INFINITE;
     for (uint32_t n = 0; n < count; ++n) {
         const BeamPacket &packet = packets[n];
-        if (packet.active == 0)
+        if (packet.active == 0) {
+            leave_out(n);
             continue;
+        }
         const auto active = from_bits<FloatPacket>(packet.active);
         // Inactive lanes repeat the first ray of all.
         const FloatPacket u = select(active, packet.u, first_u);
@@ -176,12 +181,13 @@ void BeamPackets::fit_rectangle() {
         const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
         const FloatPacket p = fused(du, FloatPacket(c), dv * s);
         const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
-        lo_p[n] = least_lane(select(active, p, FloatPacket(INFINITE)));
-        hi_p[n] = greatest_lane(select(active, p, FloatPacket(-INFINITE)));
-        lo_q[n] = least_lane(select(active, q, FloatPacket(INFINITE)));
-        hi_q[n] = greatest_lane(select(active, q, FloatPacket(-INFINITE)));
-        least[n] = least_lane(packet.least);
+        lo_p[n] = select(active, p, none_lo);
+        hi_p[n] = select(active, p, none_hi);
+        lo_q[n] = select(active, q, none_lo);
+        hi_q[n] = select(active, q, none_hi);
+        least_of[n] = packet.least;
     }
+    store(least.data(), least_lanes(least_of));
     slope_lo[0] = least_lane(lo_u);
     slope_hi[0] = greatest_lane(hi_u);
     slope_lo[1] = least_lane(lo_v);
@@ -189,10 +195,8 @@ void BeamPackets::fit_rectangle() {
     const float size_u = std::max(std::abs(slope_lo[0]), std::abs(slope_hi[0]));
     const float size_v = std::max(std::abs(slope_lo[1]), std::abs(slope_hi[1]));
 
-    const FloatPacket p0 = mlrt::load<FloatPacket>(lo_p),
-                      p1 = mlrt::load<FloatPacket>(hi_p);
-    const FloatPacket q0 = mlrt::load<FloatPacket>(lo_q),
-                      q1 = mlrt::load<FloatPacket>(hi_q);
+    const FloatPacket p0 = least_lanes(lo_p), p1 = greatest_lanes(hi_p);
+    const FloatPacket q0 = least_lanes(lo_q), q1 = greatest_lanes(hi_q);
     const float beam_p0 = least_lane(p0), beam_p1 = greatest_lane(p1);
     const float beam_q0 = least_lane(q0), beam_q1 = greatest_lane(q1);
     const float mid_p = 0.5f * (beam_p0 + beam_p1), mid_q = 0.5f * (beam_q0 + beam_q1);
