@@ -29,6 +29,9 @@ constexpr float LEAST_SLACK = 0x1p-120f;
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
 constexpr float SMALLEST_DEPTH = 0x1p-120f;
 
+// Ends of rays below it: what is lost to underflow is small beside what is above.
+constexpr float SMALLEST_END = 0x1p-60f;
+
 // Distances below it may be denormal once they are rounded, and then equal where depths
 // differ: of none of them it is certain which one is nearer.
 constexpr float SMALLEST_DISTANCE = 0x1p-125f;
@@ -56,8 +59,8 @@ bool BeamPackets::choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray
     return false;
 }
 
-void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
-                              BeamPacket &packet) const {
+FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                                     BeamPacket &packet) const {
     const uint32_t first = packet.first_ray;
     const auto [i, j, k] = axes;
     const FloatPacket di = load_padded(rays.direction[i], first, last);
@@ -87,18 +90,20 @@ void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
         packet.strays =
             finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
 
+    // One division for both bounds. What is rounded to a small t_max may exceed it by more
+    // than that share, and small depths may have lost digits: nothing is certain of them.
     const FloatPacket end = t_max * main;
-    const FloatPacket before_end =
-        maximum(end * (1 - WIDEN_DEPTH) - SMALLEST_DEPTH, FloatPacket(0.0f));
-    // What is rounded to a denormal t_max may exceed it by more than that share.
-    const FloatPacket beyond_end =
-        (t_max + SMALLEST_FLOAT) * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
-    packet.least = masked(packet.active, 1.0f / beyond_end, INFINITE);
-    packet.greatest = 1.0f / before_end;
-    const FloatPacket begin =
-        maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
-        SMALLEST_DEPTH;
-    packet.nearest = (1 - WIDEN_DEPTH) / greatest_lane(masked(packet.active, begin, 0.0f));
+    const FloatPacket at_end = 1.0f / end;
+    const auto moderate = (t_max >= SMALLEST_END) & (end >= SMALLEST_END);
+    packet.least =
+        masked(packet.active,
+               select(moderate, at_end * (1 - WIDEN_DEPTH), FloatPacket(0.0f)), INFINITE);
+    packet.greatest = select(moderate, at_end * (1 + WIDEN_DEPTH), FloatPacket(INFINITE));
+    return masked(packet.active,
+                  maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
+                          (1 + WIDEN_DEPTH) +
+                      SMALLEST_DEPTH,
+                  0.0f);
 }
 
 // The image of the film's x axis in slopes, at the first packet.
@@ -227,10 +232,11 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
         return;
     const BeamPacket *first_active = nullptr;
+    FloatPacket begin = 0.0f;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
         BeamPacket &packet = packets[count++];
         packet.first_ray = i;
-        load_packet(rays, first + ray_count, packet);
+        begin = maximum(load_packet(rays, first + ray_count, packet), begin);
         if (packet.active != 0 && !first_active)
             first_active = &packet;
         any_stray |= packet.strays != 0;
@@ -238,6 +244,7 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     if (!first_active)
         return;
     any_active = true;
+    nearest = (1 - WIDEN_DEPTH) / greatest_lane(begin);
     const uint32_t lane = uint32_t(__builtin_ctz(first_active->active));
     rectangle = {};
     rectangle.center_u = to_lanes<float>(first_active->u)[lane];

@@ -141,7 +141,7 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
     const auto possible = (highest >= packet.least) & (smallest >= -edge_error);
     const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
     const auto nearer =
-        possible & certain & (lowest > packet.greatest) & (highest < packet.nearest);
+        possible & certain & (lowest > packet.greatest) & (highest < beam_.nearest);
     const LaneBits found = to_bits(nearer);
     packet.found |= found;
     if constexpr (query == Query::any) {
