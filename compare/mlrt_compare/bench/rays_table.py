@@ -65,7 +65,7 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
         f"  MLRT is {ratio_text(block['speedup'])} times as fast as "
         f"{fastest_peer(block)['name']}{aims_text(block['speedup'])}",
     ]
-    if block["exactness"] is not None:
+    if block.get("exactness") is not None:
         lines.append(
             f"  exactness takes {ratio_text(block['exactness'])} times the time of single "
             f"precision: at most {MOST_FOR_EXACTNESS:g} is meant"
