@@ -11,11 +11,13 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
-from .scene_arrays import Emitter, Vec3
+from .scene_arrays import NONE, Emitter, SceneArrays, Vec3
 
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
 """Squares of distances along a diagonal between these are normal numbers."""
+SMALLEST_AREA = 2.0**-120
+"""Of what glows: the reciprocal, and shares of it, are normal numbers."""
 
 
 def read_emitter(
@@ -136,6 +138,24 @@ def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> Non
             raise SceneError(
                 f"the scene measures {extent:.3g} with its '{light.type}' light: the "
                 "square of that is out of the range of single precision, scale the scene"
+            )
+
+
+def check_areas(arrays: SceneArrays) -> None:
+    """Raises SceneError for a shape that glows and whose area is not zero, but too small a
+    number for single precision, in which it would be dark."""
+    for shape, name in zip(arrays.shapes, arrays.shape_names, strict=True):
+        if shape.emitter == NONE:
+            continue
+        faces = arrays.faces[shape.first_face : shape.first_face + shape.face_count]
+        a, b, c = (arrays.vertices[faces[:, k]].astype(np.float64) for k in range(3))
+        with np.errstate(invalid="ignore"):
+            area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        total = float(np.nansum(area))
+        if 0 < total < SMALLEST_AREA:
+            raise SceneError(
+                f"{name} glows and has an area of {total:.3g}, which is out of the range "
+                "of single precision: scale the scene up or remove the light"
             )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._dispatch import core
-from .emitters import check_distances
+from .emitters import check_areas, check_distances
 from .errors import MlrtError, warn_of
 from .integrators import own_aovs
 from .options import (
@@ -223,6 +223,7 @@ def prepare(
     else:
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
     check_distances(arrays.emitters, obtained.tree.bounds)
+    check_areas(arrays)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,

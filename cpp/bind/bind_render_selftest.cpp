@@ -62,15 +62,6 @@ std::vector<float> spread_sample(const nb::dict &dict, uint32_t seed, uint32_t s
     return numbers;
 }
 
-nb::dict image_plane_map(const nb::dict &camera, const nb::dict &film) {
-    const ImagePlane plane = image_plane(camera_from(camera), film_from(film));
-    nb::dict result;
-    result["d0"] = array(plane.d0);
-    result["dx"] = array(plane.dx);
-    result["dy"] = array(plane.dy);
-    return result;
-}
-
 Floats3 camera_direction(const nb::dict &camera, const nb::dict &film, float x, float y) {
     return array(image_plane(camera_from(camera), film_from(film)).direction(x, y));
 }
@@ -252,7 +243,6 @@ void bind_render_selftest(nb::module_ &m) {
     s.def("spread_sample", &spread_sample, nb::arg("sampler"), nb::arg("seed"),
           nb::arg("samples"), nb::arg("index"), nb::arg("drawn"),
           "Numbers of one sample; drawn: 2 for each pair, 1 for a number that is dropped.");
-    s.def("image_plane", &image_plane_map, nb::arg("camera"), nb::arg("film"));
     s.def("camera_direction", &camera_direction, nb::arg("camera"), nb::arg("film"),
           nb::arg("x"), nb::arg("y"));
     s.def("filter_weights", &filter_weights, nb::arg("film"), nb::arg("distances"));

@@ -91,7 +91,8 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
         point.normal =
             (Real(1.0f) - b0 - b1) * normals.a + (b0 * normals.b + b1 * normals.c);
     } else {
-        point.normal = cross(e0, e1);
+        const Real scale(table.edge_scale);
+        point.normal = cross(scale * e0, scale * e1);
     }
     point.normal = normalize(point.normal);
     if (shape.flip_normals)

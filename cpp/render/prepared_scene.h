@@ -16,6 +16,7 @@ struct EmitterTable {
     Distribution face_areas;      // area, unless a rectangle: of the faces of its shape
     Vec3f normal{};               // rectangle: unit, on the side that glows
     float inverse_area = 0;       // area: 1 / area
+    float edge_scale = 1;         // area: a power of two, 1 unless the area is tiny
     float cos_cutoff = 0;         // spot
     float cos_beam = 0;           // spot
     float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
