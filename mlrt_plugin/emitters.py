@@ -11,11 +11,13 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
-from .scene_arrays import Emitter, Vec3
+from .scene_arrays import NONE, Emitter, SceneArrays, Vec3
 
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
 """Squares of distances along a diagonal between these are normal numbers."""
+SMALLEST_AREA = 2.0**-120
+"""Of what glows: the reciprocal, and shares of it, are normal numbers."""
 
 
 def read_emitter(
@@ -57,7 +59,23 @@ def read_emitter(
             position=finite(objects.vec3(parts["position"]), name, "position"),
             sampling_weight=weight,
         )
+    if plugin == "constant":
+        return Emitter(
+            "constant", objects.color(parts["radiance"], name), sampling_weight=weight
+        )
     to_world = objects.matrix(emitter.world_transform())
+    if plugin == "envmap":
+        scale = objects.number(parts["scale"])
+        if not (scale >= 0 and math.isfinite(scale)):
+            raise SceneError(f"{name} has scale = {scale:g}: it must be at least 0")
+        objects.check_invertible(to_world, name)
+        first, second, third = (objects.vec3(column) for column in to_world[:3, :3].T)
+        return Emitter(
+            "envmap",
+            (scale, scale, scale),
+            axes=(first, second, third),
+            sampling_weight=weight,
+        )
     axis = unit_axis(to_world, name)
     if plugin == "directional":
         return Emitter(
@@ -83,21 +101,36 @@ def read_emitter(
             sampling_weight=weight,
         )
     raise UnsupportedFeature(
-        f"{name} is not supported: only point, spot, directional and area are so far"
+        f"{name} is not supported: only point, spot, directional, area, constant and "
+        "envmap are so far"
     )
+
+
+def read_environment(emitter: Any, name: str) -> npt.NDArray[np.float32]:
+    """(H, W, 3) float32 picture of an `envmap`, without its scale.
+
+    Raises SceneError if it holds NaN or infinity.
+    """
+    # Mitsuba puts a copy of the last column before the first, and one of the first behind.
+    padded = np.array(objects.members(emitter)["data"], np.float32)
+    picture = np.ascontiguousarray(padded[:, 1:-1, :3])
+    if not np.isfinite(picture).all():
+        file = objects.described(emitter, "filename", "its bitmap").strip('"')
+        raise SceneError(f"{name} has NaN or infinite pixels: repair '{file}'")
+    return picture
 
 
 def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> None:
     """Raises SceneError for a scene in which light cannot fall off.
 
     It does with the square of the distance, which single precision has no number for in
-    scenes beyond all measure. Directional light does not fall off.
+    scenes beyond all measure. Directional light and that from all around do not fall off.
     bounds: of all that can be hit.
     """
     if bounds[0] > bounds[1]:
         return
     for light in lights:
-        if light.type == "directional":
+        if light.type in ("directional", "constant", "envmap"):
             continue
         points = [*bounds, light.position] if light.type != "area" else [*bounds]
         extent = float(np.ptp(np.array(points, np.float64), axis=0).max())
@@ -105,6 +138,24 @@ def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> Non
             raise SceneError(
                 f"the scene measures {extent:.3g} with its '{light.type}' light: the "
                 "square of that is out of the range of single precision, scale the scene"
+            )
+
+
+def check_areas(arrays: SceneArrays) -> None:
+    """Raises SceneError for a shape that glows and whose area is not zero, but too small a
+    number for single precision, in which it would be dark."""
+    for shape, name in zip(arrays.shapes, arrays.shape_names, strict=True):
+        if shape.emitter == NONE:
+            continue
+        faces = arrays.faces[shape.first_face : shape.first_face + shape.face_count]
+        a, b, c = (arrays.vertices[faces[:, k]].astype(np.float64) for k in range(3))
+        with np.errstate(invalid="ignore"):
+            area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        total = float(np.nansum(area))
+        if 0 < total < SMALLEST_AREA:
+            raise SceneError(
+                f"{name} glows and has an area of {total:.3g}, which is out of the range "
+                "of single precision: scale the scene up or remove the light"
             )
 
 
@@ -122,8 +173,7 @@ def unit_axis(to_world: npt.NDArray[np.float64], name: str) -> Vec3:
     SceneError if it is not finite.
     """
     axes = to_world[:3, :3]
-    if not np.isfinite(to_world).all():
-        raise SceneError(f"{name} has a to_world with NaN or infinite entries: repair it")
+    objects.check_finite(to_world, name)
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-3):
         raise UnsupportedFeature(
             f"{name} has a to_world that scales, which is not supported: use a rotation "

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from ._dispatch import core
+from .errors import MlrtError
 from .scene_arrays import Camera, Film
 
 
@@ -15,7 +18,7 @@ class ImagePlane:
     """The ray through the film position (x, y), in pixels of the whole film, is
     {origin + t (base + x dx + y dy)}, where t is the depth along the camera's z.
 
-    As ``cpp/render/camera.h`` has it; (3,) float64 in world space.
+    (3,) float64 in world space, from ``cpp/render/camera.h``.
     """
 
     origin: npt.NDArray[np.float64]
@@ -38,15 +41,12 @@ class ImagePlane:
 
 
 def image_plane(camera: Camera, film: Film) -> ImagePlane:
-    """The map of a camera: x points to the left of the picture, y up, and the field of view
-    spans the width of the film (Mitsuba's perspective.cpp)."""
-    x_axis, y_axis, z_axis = np.array(camera.axes, np.float64)
-    tan_x = camera.tan_half_fov_x
-    tan_y = tan_x * film.height / film.width
-    shift_x, shift_y = (1 - 2 * offset for offset in camera.principal_point_offset)
-    return ImagePlane(
-        origin=np.array(camera.origin, np.float64),
-        base=z_axis + shift_x * tan_x * x_axis + shift_y * tan_y * y_axis,
-        dx=-2 * tan_x / film.width * x_axis,
-        dy=-2 * tan_y / film.height * y_axis,
-    )
+    """The map of a `perspective` camera, by the native core. Raises MlrtError for another
+    camera."""
+    if camera.type != "perspective":
+        raise MlrtError(
+            f"the rays of a camera of type '{camera.type}' have no common origin: choose a "
+            "sensor of type 'perspective'"
+        )
+    plane = core.image_plane(dataclasses.asdict(camera), dataclasses.asdict(film))
+    return ImagePlane(**{name: np.array(vector) for name, vector in plane.items()})

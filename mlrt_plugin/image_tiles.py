@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +12,6 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .errors import MlrtError
-from .image_plane import image_plane
 from .options import integer
 from .render import Prepared, PreparedScene
 
@@ -114,25 +114,16 @@ def entry_point_search(
 ) -> Callable[[int, int, int, int], EntryPoint]:
     """A function of a rectangle (x, y, width, height) of the image."""
     arrays = prepared.arrays
-    plane = image_plane(arrays.camera, arrays.film)
-    rays = [vector.tolist() for vector in (plane.origin, plane.base, plane.dx, plane.dy)]
+    camera, film = dataclasses.asdict(arrays.camera), dataclasses.asdict(arrays.film)
     left, top = arrays.film.crop_x, arrays.film.crop_y
     depths, leaves = node_depths(core.tree_nodes(prepared.tree))
 
     def search(x: int, y: int, width: int, height: int) -> EntryPoint:
-        beam = core.mlrta_selftest.camera_beam(
-            *rays,
-            left + x,
-            left + x + width,
-            top + y,
-            top + y + height,
-            arrays.camera.far_clip,
-            arrays.camera.near_clip,
-        )
-        entries = core.mlrta_selftest.frontier(prepared.tree, beam, 1, options)
-        if not entries:
+        rectangle = (left + x, top + y, width, height)
+        entry = core.entry_point(prepared.tree, camera, film, rectangle, options)
+        if entry is None:
             return None, None, None, False
-        node, low, high, _ = entries[0]
+        node, low, high = entry
         cell = np.array((low, high), np.float32)
         return node, int(depths[node]), cell, bool(leaves[node])
 

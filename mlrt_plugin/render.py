@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._dispatch import core
-from .emitters import check_distances
+from .emitters import check_areas, check_distances
 from .errors import MlrtError, warn_of
 from .integrators import own_aovs
 from .options import (
@@ -23,6 +23,7 @@ from .options import (
     integer,
     split_options,
 )
+from .samplers import possible_spp
 from .scene_arrays import Lighting, SceneArrays, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
@@ -123,7 +124,9 @@ class PreparedScene:
         if build:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
-        samples = checked_spp(self.arrays.spp if spp is None else spp)
+        asked = checked_spp(self.arrays.spp if spp is None else spp)
+        sampler, film = self.arrays.sampler, self.arrays.film
+        samples = possible_spp(sampler, asked, film.crop_width * film.crop_height)
         depth = self.lighting.integrator == "depth"
         wanted = list(
             dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(self.lighting))])
@@ -139,6 +142,8 @@ class PreparedScene:
             wanted,
             progress,
             shadow_offset,
+            {**dataclasses.asdict(sampler), "base_seed": self.arrays.base_seed},
+            max(1, self.lighting.emitter_samples),
         )
         if progress is not None:
             progress(1.0)
@@ -151,7 +156,7 @@ class PreparedScene:
             aovs=images,
             timings={**self.timings, "render": time.perf_counter() - start},
             counters=dict(result["counters"]),
-            warnings=self.warnings,
+            warnings=self.warnings + rounded(sampler.type, asked, samples),
         )
 
 
@@ -219,6 +224,7 @@ def prepare(
     else:
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
     check_distances(arrays.emitters, obtained.tree.bounds)
+    check_areas(arrays)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,
@@ -230,6 +236,7 @@ def prepare(
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
+        arrays.environment if arrays.environment.size else None,
         arrays.uvs,
         [fields_of(texture) for texture in arrays.textures],
         arrays.material_textures,
@@ -313,6 +320,13 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
+
+
+def rounded(sampler: str, asked: int, taken: int) -> tuple[str, ...]:
+    """What there is to say of samples per pixel that are not as many as were asked for."""
+    if taken == asked:
+        return ()
+    return (f"sampler '{sampler}' takes {taken} samples a pixel in place of {asked}",)
 
 
 def checked_spp(spp: int) -> int:

@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+from mlrt_compare.bench import adversarial
 
 FloatArray = npt.NDArray[np.float32]
 IndexArray = npt.NDArray[np.uint32]
@@ -232,14 +233,8 @@ def from_vertices(rng: np.random.Generator, scene: Scene, count: int) -> Rays:
 
 
 def grazing(rng: np.random.Generator, scene: Scene, count: int) -> Rays:
-    """Rays almost in the plane of a face, or exactly along one of its edges."""
-    a, b = _edges(rng, scene, count)
-    along = b.astype(np.float64) - a
-    tilt = rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-8, -3, (count, 1))
-    tilt[rng.random(count) < 0.3] = 0
-    directions = (along + tilt).astype(np.float32)
-    directions[~directions.any(axis=1)] = (0, 1, 0)
-    return (a - np.float32(2) * directions).astype(np.float32), directions
+    """Rays as `mlrt-bench hits` has them, so that both mean the same by the word."""
+    return adversarial.grazing(rng, adversarial.SmallScene("", *scene), count)
 
 
 def extreme_lengths(rng: np.random.Generator, scene: Scene, count: int) -> Rays:

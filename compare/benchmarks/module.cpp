@@ -1,4 +1,5 @@
 // The Python module of mlrt-bench.
+#include "base/exactness.h"
 #include "bind/build_options.h"
 #include "bind/mesh_arrays.h"
 #include "bind/trace_options.h"
@@ -295,6 +296,7 @@ void bind_embree(nb::module_ &m) {
 NB_MODULE(MLRT_MODULE, m) {
     using namespace mlrt::bench;
     m.attr("isa") = MLRT_ISA_NAME;
+    m.attr("exact") = mlrt::EXACT;
     m.def(
         "release_memory", [] { malloc_trim(0); },
         "Returns freed memory to the system, so that the next piece of work starts as in "

@@ -6,6 +6,7 @@
 namespace mlrt {
 
 void bind_beam_leaf_selftest(nanobind::module_ &m);
+void bind_image_plane(nanobind::module_ &m);
 void bind_kdtree_selftest(nanobind::module_ &m);
 void bind_mlrta_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);

@@ -1,6 +1,7 @@
 // Sixteen rays side by side, and one triangle against all of them.
 #pragma once
 
+#include "base/exactness.h"
 #include "base/simd.h"
 #include "base/vec.h"
 #include "geometry/triangle_test.h"
@@ -148,11 +149,42 @@ auto plane_numerator(const RayPacket<Origin> &rays, const TrianglePlane &plane,
     }
 }
 
+// What intersect() is where hits are not exact: the signs of the volumes and the distance
+// as single precision has them.
+template <typename Origin>
+PacketCandidates intersect_inexactly(const RayPacket<Origin> &rays, LaneBits lanes,
+                                     const Triangle &triangle) {
+    const auto volume = [&](const auto &p, const auto &q) {
+        const auto n = cross(p, q);
+        return rays.direction.x * n.x + rays.direction.y * n.y + rays.direction.z * n.z;
+    };
+    const auto relative = [&](const Vec3f &p) {
+        if constexpr (std::is_same_v<Origin, CommonOrigin>)
+            return p - rays.origin.point;
+        else
+            return in_all_lanes(p) - rays.origin.point;
+    };
+    const auto a = relative(triangle.a), b = relative(triangle.b), c = relative(triangle.c);
+    const FloatPacket u = volume(b, c), v = volume(c, a), w = volume(a, b);
+    PacketCandidates result;
+    result.hit = lanes & to_bits((minimum(u, minimum(v, w)) >= 0.0f) |
+                                 (maximum(u, maximum(v, w)) <= 0.0f));
+    if (result.hit == 0)
+        return result;
+    const Vec3f normal = cross(triangle.b - triangle.a, triangle.c - triangle.a);
+    result.t = (a.x * normal.x + a.y * normal.y + a.z * normal.z) /
+               (rays.direction.x * normal.x + rays.direction.y * normal.y +
+                rays.direction.z * normal.z);
+    return result;
+}
+
 // Tests one triangle against the given lanes, with the decisions and distances of
 // triangle_test.h, whatever the packet.
 template <typename Origin>
 PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
                            const Triangle &triangle) {
+    if constexpr (!EXACT)
+        return intersect_inexactly(rays, lanes, triangle);
     PacketCandidates result;
     const FilteredVolumes<FloatPacket> volumes(rays, triangle);
     const LaneBits misses = volumes.certain_misses();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/simd.h"
+#include "base/transpose.h"
 #include "geometry/triangle.h"
 
 #include <array>

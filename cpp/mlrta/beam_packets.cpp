@@ -1,5 +1,6 @@
 #include "mlrta/beam_packets.h"
 
+#include "base/transpose.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
 

@@ -2,6 +2,7 @@
 // far as it pays, after regrouping rays that leave gaps, and by packets (X2) for the rest.
 #pragma once
 
+#include "base/exactness.h"
 #include "mlrta/beam_leaf.h"
 #include "mlrta/beam_triangle_tests.h"
 #include "mlrta/packet_tracer.h"
@@ -92,15 +93,23 @@ private:
             left &= ~packet.found;
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
-                output_.set(packet.first_ray, packet.found,
-                            memory_.distances.of(rays_, packet.first_ray, packet.found,
-                                                 packet.primitive, counters_),
+                output_.set(packet.first_ray, packet.found, distances_of(packet),
                             packet.primitive);
             else
                 output_.set(packet.first_ray, packet.found, packet.primitive);
         }
         if (left != 0)
             packets_.trace_lanes(packet.first_ray, left, frontier);
+    }
+
+    FloatPacket distances_of(const BeamPacket &packet) {
+        if constexpr (EXACT)
+            return memory_.distances.of(rays_, packet.first_ray, packet.found,
+                                        packet.primitive, counters_);
+        // Reciprocal depths are all that single precision needs.
+        const FloatPacket along_main_axis =
+            load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count);
+        return 1.0f / (packet.greatest * absolute(along_main_axis));
     }
 
     void trace_strays(const Frontier &frontier) {

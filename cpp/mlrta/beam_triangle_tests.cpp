@@ -1,5 +1,6 @@
 #include "mlrta/beam_triangle_tests.h"
 
+#include "base/exactness.h"
 #include "geometry/triangle_test.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
@@ -111,10 +112,11 @@ LaneBits BeamTriangleTests<query>::touched_packets(const TriangleForms &forms,
         return middle + fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
     };
     const FloatPacket edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
-    const FloatPacket highest =
-        fused(greatest(TriangleForms::DEPTH), FloatPacket(forms.depth_grow[lane]),
-              FloatPacket(forms.depth_error[lane]));
-    touched &= (edges >= -FloatPacket(forms.edge_error[lane])) &
+    const FloatPacket depth = greatest(TriangleForms::DEPTH);
+    const FloatPacket highest = EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]),
+                                              FloatPacket(forms.depth_error[lane]))
+                                      : depth;
+    touched &= (edges >= -FloatPacket(EXACT ? forms.edge_error[lane] : 0.0f)) &
                (highest >= load<FloatPacket>(beam_.least));
     return to_bits(touched) & ((1u << beam_.count) - 1);
 }
@@ -129,12 +131,15 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
                            FloatPacket(forms.constant[form][lane])));
     };
     const FloatPacket depth = value(TriangleForms::DEPTH);
-    const FloatPacket error(forms.depth_error[lane]), edge_error(forms.edge_error[lane]);
-    const FloatPacket highest = fused(depth, FloatPacket(forms.depth_grow[lane]), error);
-    const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
+    const FloatPacket error(forms.depth_error[lane]);
+    const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
+    const FloatPacket highest =
+        EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
+    const FloatPacket lowest =
+        EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
     const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
     const auto possible = (highest >= packet.least) & (smallest >= -edge_error);
-    const auto certain = smallest > edge_error;
+    const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
     const auto nearer =
         possible & certain & (lowest > packet.greatest) & (highest < beam_.nearest);
     const LaneBits found = to_bits(nearer);
@@ -147,7 +152,7 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
         packet.primitive =
             select(MaskOf<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
     }
-    const LaneBits open = to_bits(possible) & ~found;
+    const LaneBits open = EXACT ? to_bits(possible) & ~found : 0;
     if (open != 0) [[unlikely]]
         decide(packet, open, to_bits(certain), primitive);
     return (found | open) != 0;

@@ -1,5 +1,6 @@
 #include "mlrta/triangle_forms.h"
 
+#include "base/exactness.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
@@ -57,38 +58,45 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     const Vec3<Real> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
     const Vec3<Real> a = va - o, b = vb - o, c = vc - o;
     const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
-    const Vec3<DoubleOf<Real>> da = to_double(va);
-    const Vec3<DoubleOf<Real>> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
-    const Vec3<Real> normals[4] = {cross(b, bc),
-                                   cross(c, ca),
-                                   cross(a, ab),
-                                   {Real(d_normal.x), Real(d_normal.y), Real(d_normal.z)}};
-    const Real volume(dot(da - to_double(o), d_normal));
+    Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
+    Real volume;
+    if constexpr (EXACT) {
+        const Vec3<DoubleOf<Real>> da = to_double(va);
+        const Vec3<DoubleOf<Real>> normal = cross(to_double(vb) - da, to_double(vc) - da);
+        normals[DEPTH] = {Real(normal.x), Real(normal.y), Real(normal.z)};
+        volume = Real(dot(da - to_double(o), normal));
+    } else {
+        normals[DEPTH] = cross(ca, ab);
+        volume = dot(a, normals[DEPTH]);
+    }
 
-    const Real size =
-        maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
-    const Real edge = maximum(largest_component(ab),
-                              maximum(largest_component(bc), largest_component(ca)));
-    const Real volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
-                              (2 * FLOAT_ROUNDOFF) * absolute(volume);
     const Real inverse = 1.0f / volume;
-    const Real inverse_size = absolute(inverse);
-    const Real share = volume_error * inverse_size;
-    const auto safe = (size < LARGEST_SIZE) & (absolute(volume) > SMALLEST_VOLUME) &
-                      (share <= LARGEST_SHARE);
+    const Real sum(beam.greatest_sum);
     const LaneBits given = (1u << count) - 1;
+    MaskOf<Real> safe = absolute(volume) > SMALLEST_VOLUME;
+    Real share, edge_bound, depth_bound;
+    if constexpr (EXACT) {
+        const Real size = maximum(largest_component(a),
+                                  maximum(largest_component(b), largest_component(c)));
+        const Real edge = maximum(largest_component(ab),
+                                  maximum(largest_component(bc), largest_component(ca)));
+        const Real volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
+                                  (2 * FLOAT_ROUNDOFF) * absolute(volume);
+        const Real inverse_size = absolute(inverse);
+        share = volume_error * inverse_size;
+        safe &= (size < LARGEST_SIZE) & (share <= LARGEST_SHARE);
+        edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
+        depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
+                      sum * inverse_size;
+        unsafe = given & ~to_bits(safe);
+    } else {
+        share = edge_bound = depth_bound = Real(0.0f);
+        unsafe = 0;
+    }
     const LaneBits safe_bits = to_bits(safe) & given;
-    unsafe = given & ~safe_bits;
     possible = 0;
     if (safe_bits == 0)
         return;
-
-    const Real sum(beam.greatest_sum);
-    const Real edge_bound =
-        (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
-    const Real depth_bound =
-        (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) * sum *
-        inverse_size;
     store(edge_error, edge_bound);
 
     const SlopeRectangle &rectangle = beam.rectangle;

@@ -10,8 +10,23 @@ namespace mlrt {
 
 namespace {
 
+// Areas below that have squares that single precision may lose digits of.
+constexpr float SMALL_AREA = 0x1p-50f;
+
+float parallelogram_area(Vec3f u, Vec3f v) {
+    const float usual = length(cross(u, v));
+    return usual > SMALL_AREA ? usual : float(length(cross(Vec3d(u), Vec3d(v))));
+}
+
 float face_area(const Triangle &triangle) {
-    return 0.5f * length(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+    return 0.5f * parallelogram_area(triangle.b - triangle.a, triangle.c - triangle.a);
+}
+
+// Makes the edges of faces with such areas about 1 long.
+float scale_of_edges(float inverse_area) {
+    if (!(inverse_area > 1 / SMALL_AREA))
+        return 1;
+    return std::ldexp(1.0f, std::ilogb(std::sqrt(inverse_area)));
 }
 
 // How far, at most, faces of a rectangle lie off the plane of the first of them.
@@ -55,7 +70,7 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
     if (emitter.rectangle) {
         const Vec3f normal = cross(emitter.edge_u, emitter.edge_v);
         table.unevenness = unevenness(scene, shape);
-        const float area = length(normal);
+        const float area = parallelogram_area(emitter.edge_u, emitter.edge_v);
         table.inverse_area = area > 0 ? 1.0f / area : 0.0f;
         // A mirrored rectangle glows on the side of its vertex normals, which is not that
         // of its edges' product.
@@ -70,6 +85,7 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
             areas[i] = face_area(scene.tree->triangles[shape.first_face + i]);
         table.face_areas = Distribution(areas);
         table.inverse_area = table.face_areas.normalization();
+        table.edge_scale = scale_of_edges(table.inverse_area);
     }
     return table;
 }
@@ -77,7 +93,8 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
 } // namespace
 
 PreparedScene::PreparedScene(SceneData scene_data)
-    : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)) {
+    : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
+      environment(data) {
     shape_of_face.resize(data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];

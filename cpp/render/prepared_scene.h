@@ -3,6 +3,7 @@
 
 #include "render/camera.h"
 #include "render/distribution.h"
+#include "render/environment.h"
 #include "render/scene.h"
 
 #include <cstdint>
@@ -15,6 +16,7 @@ struct EmitterTable {
     Distribution face_areas;      // area, unless a rectangle: of the faces of its shape
     Vec3f normal{};               // rectangle: unit, on the side that glows
     float inverse_area = 0;       // area: 1 / area
+    float edge_scale = 1;         // area: a power of two, 1 unless the area is tiny
     float cos_cutoff = 0;         // spot
     float cos_beam = 0;           // spot
     float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
@@ -31,7 +33,8 @@ struct PreparedScene {
     bool any_material_is_textured = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
-    Vec3f center{};                           // of a sphere around all triangles
+    Environment environment;
+    Vec3f center{}; // of a sphere around all triangles
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);

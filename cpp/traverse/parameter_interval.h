@@ -11,6 +11,7 @@
 // error below 4.01 u, which leaves more than the margin above.
 #pragma once
 
+#include "base/exactness.h"
 #include "base/simd.h"
 #include "base/vec.h"
 
@@ -18,7 +19,7 @@
 
 namespace mlrt {
 
-inline constexpr float SLACK = 0x1p-21f;
+inline constexpr float SLACK = EXACT ? 0x1p-21f : 0.0f;
 inline constexpr float WIDEN_FAR = 1 + SLACK;
 inline constexpr float WIDEN_NEAR = 1 - SLACK;
 

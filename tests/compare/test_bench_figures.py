@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+import repository
 from bench_figures import block, run
 from mlrt_compare.bench import build_table, table
 from mlrt_compare.bench.frame_runs import FrameRun, measured_in_turns, needs_run
 from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
 from mlrt_compare.bench.measure import Timing, in_turns
 from mlrt_compare.bench.rays_contenders import ray_contenders
+from mlrt_compare.bench.rays_goals import cost_of_exactness, ray_speedup
 from mlrt_compare.bench.speedup import Speedup, ratio_lines, speedup
 
 QUIET = Timing(wall=1.0, cpu=1.9, waited=0.0)
@@ -233,3 +235,36 @@ def test_every_mode_of_embree_is_tried_with_every_tile() -> None:
         assert streams["NM"] == [(f"NM{n}", tile) for n in (8, 16) for tile in (16, 64)]
         assert streams["1M"] == [("1M", 16), ("1M", 64)]
     assert not tried
+
+
+def test_cost_of_exactness_is_told_of_the_same_runs() -> None:
+    def contender(name: str, seconds: list[float]) -> dict[str, Any]:
+        engine = name.split()[0]
+        runs = [
+            {"frame": {"wall": wall, "cpu": 2 * wall, "waited": 0.0}, "busy": False}
+            for wall in seconds
+        ]
+        return {"name": name, "engine": engine, "runs": runs}
+
+    own, embree = contender("MLRT", [3.0, 4.0, 6.0]), contender("Embree HIGH NM", [1.0])
+    inexact = contender("MLRT inexact", [2.0, 2.0, 3.0])
+    block = {"spp": 1, "shadows": False, "contenders": [own, embree, inexact]}
+    assert cost_of_exactness(block) == {"best": 1.5, "median": 2.0, "cpu": 1.5}
+    # It is nobody's peer.
+    assert ray_speedup("office", block).best == pytest.approx(1 / 3)
+    assert cost_of_exactness({**block, "contenders": [own, embree]}) is None
+
+
+def test_the_plugin_is_exact() -> None:
+    """Only the benchmarks' second module is compiled without exactness."""
+    named = [
+        path.relative_to(repository.ROOT).as_posix()
+        for folder in ("cpp", "compare/benchmarks")
+        for path in (repository.ROOT / folder).rglob("*")
+        if path.is_file() and "MLRT_INEXACT" in path.read_text(errors="ignore")
+    ]
+    assert sorted(named) == ["compare/benchmarks/CMakeLists.txt", "cpp/base/exactness.h"]
+    recipe = (repository.ROOT / "compare/benchmarks/CMakeLists.txt").read_text()
+    assert (
+        recipe.count("target_compile_definitions(_bench_inexact PRIVATE MLRT_INEXACT)") == 1
+    )

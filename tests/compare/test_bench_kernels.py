@@ -9,14 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bench_command import assert_one_sentence, command
+from mlrt_compare.bench.kernel_shadows import study_shadows
 from mlrt_compare.bench.kernels import (
     AIMS,
     closed_meshes,
     compare,
     kernel_contenders,
     rays_inside,
+    share_of_ties,
 )
 from mlrt_compare.bench.native import Native
+from mlrt_compare.bench.offset_scene import Placement
+from mlrt_compare.bench.offsets_command import measure
 
 SEED = 20261128
 NAMES = [
@@ -62,14 +66,47 @@ def test_only_exact_tests_find_all(native: Native, aim: str) -> None:
     leaks = dict.fromkeys(NAMES, 0)
     for mesh in closed_meshes(3):
         contenders = kernel_contenders(native, mesh.vertices, mesh.faces, 1)
-        rows = compare(contenders, *rays_inside(mesh, aim, 4000, SEED), 1)
+        rows = compare(mesh, contenders, *rays_inside(mesh, aim, 4000, SEED), 1)
         assert [row["name"] for row in rows] == NAMES
         for row in rows:
             leaks[row["name"]] += row["leaks"]
+            # Other faces may tie, but a leak is always wrong.
+            assert row["wrong_per_billion"] >= row["leaks"] / row["rays"] * 1e9
         assert (rows[3]["other_hits"], rows[3]["inexact_t"]) == (0, 0)
+        assert rows[3]["wrong_per_billion"] == 0
     assert leaks["exact"] == leaks["MLRT as usual"] == 0
     if aim == "vertices":
         assert leaks["single precision"] > 100
+
+
+def test_ties_at_vertices_are_told_from_wrong_faces() -> None:
+    """Of an octahedron, whose vertices are exact: each of the four faces around one is as
+    near as the others, and the opposite ones are not met."""
+    mesh = closed_meshes(1)[0]
+    tip = np.float32([0, 0, 1])
+    touches = (mesh.vertices[mesh.faces] == tip).all(axis=2).any(axis=1)
+    assert touches.sum() == 4
+    faces = np.arange(len(mesh.faces))
+    origins = np.zeros((len(faces), 3), np.float32)
+    directions = np.repeat(tip[None], len(faces), axis=0)
+    t = np.ones(len(faces), np.float32)
+    for chosen, expected in ((faces[touches], 1.0), (faces[~touches], 0.0)):
+        assert share_of_ties(mesh, origins, directions, faces, t, chosen) == expected
+
+
+def test_shadow_rays_of_exact_tests_are_those_of_the_renderer(native: Native) -> None:
+    """With robust offsets none is wrong, and with Mitsuba's as many pixels as the renderer
+    gets wrong, but for what the other direction of its rays decides."""
+    placement = Placement(size=1e-3)
+    rows = study_shadows(native, placement, 40, 1, 1)
+    assert [row["name"] for row in rows[::2]] == NAMES
+    judgements, _ = measure("point", placement, 40)
+    by_offset = {row["offset"]: row for row in rows if row["name"] == "exact"}
+    robust, usual = by_offset["robust"], by_offset["mitsuba"]
+    assert (robust["acne"], robust["leaks"], robust["other_hits"]) == (0, 0, 0)
+    assert robust["lit"] > 300 and robust["dark"] > 100
+    assert usual["leaks"] > 0
+    assert abs(usual["leaks"] - judgements["mitsuba"].leaks) <= 0.1 * usual["leaks"] + 2
 
 
 def test_the_command_tells_and_keeps_it(
@@ -82,6 +119,7 @@ def test_the_command_tells_and_keeps_it(
     )  # fmt: skip
     assert child.returncode == 0, child.stderr
     assert "ball, 128 faces, rays at vertices, 1 threads:" in child.stdout
+    assert "| watertight + robust offset |" in child.stdout
     assert (tmp_path / "kernels.png").read_bytes().startswith(b"\x89PNG")
     figures = json.loads(file.read_text())
     assert [scene["name"] for scene in figures["scenes"]] == [

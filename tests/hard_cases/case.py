@@ -90,6 +90,7 @@ def covers(number: int) -> Callable[[Test], Test]:
 
     def marked(test: Test) -> Test:
         assert test.__doc__, f"case {number} does not say why it is hard"
+        test.hard_case = number  # type: ignore[attr-defined]  # for `outcomes`
         return test
 
     return marked

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 from typing import Any
 
@@ -19,18 +18,12 @@ pytestmark = pytest.mark.usefixtures("scalar_variant")
 
 Picture = npt.NDArray[np.float32]
 SceneDict = dict[str, Any]
-OFFSETS = (
-    ("mitsuba", "robust")
-    if "shadow_offset" in inspect.signature(mlrt_plugin.render).parameters
-    else ("mitsuba",)
-)
+OFFSETS = ("mitsuba", "robust")
 each_offset = pytest.mark.parametrize("offset", OFFSETS)
 
 
 def render(scene: SceneDict, offset: str = "mitsuba", **options: Any) -> Any:
-    if "robust" in OFFSETS:
-        options["shadow_offset"] = offset
-    return mlrt_plugin.render(scene, spp=1, **options)
+    return mlrt_plugin.render(scene, spp=1, shadow_offset=offset, **options)
 
 
 def grey(scene: SceneDict, offset: str = "mitsuba", **options: Any) -> Picture:
@@ -95,10 +88,6 @@ def cube(half: float, *steps: Any) -> SceneDict:
 
 
 @covers(13)
-@pytest.mark.skipif(
-    "robust" not in OFFSETS,
-    reason="there are no shadow offsets but Mitsuba's, which are of absolute size",
-)
 @pytest.mark.parametrize("size", [1e-6, 1e-3, 1e6])
 def test_a_cast_shadow_at_any_scale(size: float) -> None:
     """Coordinates of 10^-6 units are far below the constants in usual offsets of shadow
@@ -219,14 +208,6 @@ def test_camera_in_a_closed_room(offset: str) -> None:
         assert (picture.aovs["prim"] < 36).all()
     seen = np.unique(pictures[0].aovs["prim"] // 12)
     assert seen.tolist() == [0, 1, 2]
-
-
-@covers(35)
-@pytest.mark.skip(
-    reason="flags of empty occluders do not exist; covering triangles do that"
-)
-def test_closed_room_with_flags_of_empty_occluders() -> None:
-    """A camera inside of a closed mesh has it around all of its rays, but not before."""
 
 
 @covers(37)

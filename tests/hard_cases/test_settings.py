@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import itertools
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -13,8 +16,9 @@ import workloads
 from hard_cases.case import SEED, covers
 from hard_cases.running import WAYS
 from kd_trees import BUILDERS
-from tracing import build, closest
+from tracing import build, closest, each_core
 
+from mlrt_plugin import KdTree
 from mlrt_plugin._dispatch import core
 from mlrt_plugin.threads import thread_count
 
@@ -93,6 +97,61 @@ def test_threads_and_numbers_of_rays_change_nothing(builder: str) -> None:
 
 
 @covers(38)
-@pytest.mark.skip(reason="there is one layout of nodes; variants of it do not exist")
-def test_layouts_of_nodes_change_nothing() -> None:
-    """Another layout visits the same cells at other addresses."""
+def test_places_of_nodes_change_nothing(tmp_path: Path) -> None:
+    """Another layout visits the same cells at other addresses: nodes of a lazy tree lie in
+    the order in which rays came, those of a file in that of the builder."""
+    rng = np.random.default_rng(SEED)
+    vertices, faces = workloads.soup(rng, 400)
+    origins, directions = workloads.all_rays(rng, (vertices, faces), 100)
+    eager = KdTree(vertices, faces, builder="fast")
+    file = tmp_path / "soup.kdtree"
+    eager.save(file)
+    trees = [KdTree.load(file, vertices, faces, builder="fast")]
+    for order in (slice(None), slice(None, None, -1), slice(None, None, 7)):
+        lazy = KdTree(vertices, faces, builder="lazy")
+        lazy.closest_hit(
+            np.ascontiguousarray(origins[order]), np.ascontiguousarray(directions[order])
+        )
+        trees.append(lazy)
+    for options in WAYS.values():
+        expected = eager.closest_hit(origins, directions, **options)
+        assert (expected.primitive >= 0).mean() > 0.3
+        for tree in trees:
+            found = tree.closest_hit(origins, directions, **options)
+            for mine, theirs in zip(found, expected, strict=True):
+                np.testing.assert_array_equal(mine, theirs)
+
+
+@covers(35)
+@each_core
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_shells_around_the_camera_cover_what_is_outside_only(
+    core: ModuleType, axis: int
+) -> None:
+    """A closed mesh is around all of the camera's rays, so that its triangles stop whole
+    tiles; an inner one, with holes, stands before it, and an outer one must not be seen."""
+    vertices, faces = workloads.box()
+    halves = np.arange(len(faces)) % 2 > 0
+    small, large = np.float32(0.5), np.float32(3)
+    count = np.uint32(len(vertices))
+    scene = (
+        np.concatenate([vertices * large, vertices, vertices * small]),
+        np.concatenate([faces, faces + count, faces[halves] + 2 * count]),
+    )
+    tree = build(core, scene)
+    _, directions = workloads.camera(scene, axis, 64)
+    rays = np.tile(np.float32([0.1, -0.2, 0.15]), (len(directions), 1)), directions
+    expected = closest(tree, rays, WAYS["brute force"])
+    assert (expected.face >= len(faces)).all()
+    assert len(np.unique(expected.face >= 2 * len(faces))) == 2
+    for covering, traversal, tile in itertools.product(
+        (True, False), ("packet", "interval", "beam_leaf", "adaptive"), (16, 64)
+    ):
+        options = {
+            "traversal": traversal,
+            "entry_points": True,
+            "initial_tile": tile,
+            "minimum_tile": 4,
+            "covering_triangles": covering,
+        }
+        closest(tree, rays, options).assert_same(expected)

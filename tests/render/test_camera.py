@@ -39,7 +39,7 @@ def test_rays_equal_those_of_the_sensor(film: str, sensor: str) -> None:
     camera = mi.load_dict(render_scenes.sensor(film_dict, **SENSORS[sensor]))
     camera_dict = core_scene.camera_of(camera)
     core_film = core_scene.film_of(camera.film(), film_dict)
-    plane = core.render_selftest.image_plane(camera_dict, core_film)
+    plane = core.image_plane(camera_dict, core_film)
     random = np.random.default_rng(5)
     for _ in range(200):
         sample = random.random(2)
@@ -62,7 +62,7 @@ def test_rays_equal_those_of_the_sensor(film: str, sensor: str) -> None:
                 atol=4e-6 * scale,
             )
         exact = (
-            np.array(plane["d0"]) + x * np.array(plane["dx"]) + y * np.array(plane["dy"])
+            np.array(plane["base"]) + x * np.array(plane["dx"]) + y * np.array(plane["dy"])
         )
         np.testing.assert_allclose(d, exact, atol=1e-6 * np.abs(exact).max())
         # t is the depth along the camera's axis.

@@ -100,6 +100,11 @@ def make_parser() -> Parser:
         metavar="KEY=VALUE,...",
         help="how MLRT traces, such as traversal=interval,minimum_tile=16 (as usual)",
     )
+    rays.add_argument(
+        "--inexact",
+        action="store_true",
+        help="measure MLRT that trusts single precision too, to tell what exactness costs",
+    )
     frames = commands.add_parser(
         "frames",
         help="whole frames by MLRT and by Mitsuba's llvm variant",

@@ -29,10 +29,9 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
     meshes = list(dict.fromkeys(name for name, _ in blocks))
     names = list(dict.fromkeys(row["name"] for _, block in blocks for row in block["rows"]))
     colours = mpl.colormaps["tab10"]
-    figure = Figure(figsize=(4 * len(aims), 4.4), layout="constrained")
-    for axes, aim in zip(
-        figure.subplots(1, len(aims), squeeze=False)[0], aims, strict=True
-    ):
+    figure = Figure(figsize=(4 * len(aims) + 4, 4.4), layout="constrained")
+    *panels, last = figure.subplots(1, len(aims) + 1, squeeze=False)[0]
+    for axes, aim in zip(panels, aims, strict=True):
         for mesh, block in blocks:
             if block["aim"] != aim:
                 continue
@@ -49,8 +48,37 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
         axes.set_ylim(bottom=0)
         axes.set_title(f"rays at {aim}")
         axes.set_xlabel("leaks per million rays (left edge: none)")
-    figure.axes[0].set_ylabel(f"Mrays/s, {threads} thread{'s' if threads > 1 else ''}")
-    figure.axes[-1].legend(fontsize="small")
+    draw_shadows(last, figures, threads, names, colours)
+    panels[0].set_ylabel(f"Mrays/s, {threads} thread{'s' if threads > 1 else ''}")
+    panels[-1].legend(fontsize="small")
     marks = ", ".join(f"{'os^Dv'[i % 5]} {mesh}" for i, mesh in enumerate(meshes))
     figure.suptitle(f"What exact tests of triangles cost and give ({marks})", fontsize=10)
     figure.savefig(path, dpi=100)
+
+
+def draw_shadows(
+    axes: Any, figures: dict[str, Any], threads: int, names: list[str], colours: Any
+) -> None:
+    """Mrays/s of shadow rays over pixels that are wrong, of all sizes of the scene: full
+    marks for robust offsets, empty ones for Mitsuba's."""
+    blocks = [block for block in figures["shadows"] if block["threads"] == threads]
+    for row in blocks[0]["rows"]:
+        same = [
+            other
+            for block in blocks
+            for other in block["rows"]
+            if (other["name"], other["offset"]) == (row["name"], row["offset"])
+        ]
+        wrong = sum(other["acne"] + other["leaks"] for other in same)
+        colour = colours(names.index(row["name"]))
+        axes.scatter(
+            max(wrong, LEAST),
+            row["rays_per_second"] / 1e6,
+            edgecolors=[colour],
+            facecolors=[colour] if row["offset"] == "robust" else "none",
+        )
+    axes.set_xscale("log")
+    axes.set_xlim(left=LEAST / 2)
+    axes.set_ylim(bottom=0)
+    axes.set_title("shadow rays (full: robust offsets)")
+    axes.set_xlabel("pixels with acne or leaks (left edge: none)")

@@ -24,6 +24,8 @@ from .errors import BenchError
 
 SOURCE_FOLDERS = ("cpp", "compare/benchmarks")
 SOURCE_SUFFIXES = (".h", ".cpp", ".cmake", ".txt")
+EXACT, INEXACT = "_bench", "_bench_inexact"
+"""Modules: with the core as it is, and with one that trusts single precision."""
 PACKAGES = ("nanobind", "drjit", "mitsuba")
 """Whose headers and libraries the module is compiled with."""
 REMEDY = "install what benchmarks need with pip install 'mlrt[bench]'"
@@ -111,25 +113,29 @@ def origin_of(package: str) -> str | None:
     return None if spec is None else spec.origin
 
 
-def load_native(source: Path, cache: Path) -> Native:
+def load_native(source: Path, cache: Path, module: str = EXACT) -> Native:
     """The module for the instruction set that `mlrt_plugin` chose, from ``cache`` if it was
     compiled before. Raises BenchError if it cannot be compiled."""
     tools = find_tools()
     compiler = tools.compiler_version()
     folder = cache / "native" / key_of(source, mlrt_plugin.isa, compiler)
     suffix = importlib.machinery.EXTENSION_SUFFIXES[0]
-    library, flags = folder / f"_bench{suffix}", folder / "flags.txt"
+    library, flags = folder / f"{module}{suffix}", folder / "flags.txt"
     if not library.is_file():
         compile_native(source, cache, tools, library, flags)
     return Native(loaded(library), library, compiler, flags.read_text().strip())
 
 
 def loaded(library: Path) -> ModuleType:
-    spec = importlib.util.spec_from_file_location("_bench", library)
+    spec = importlib.util.spec_from_file_location(module_name(library), library)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+def module_name(library: Path) -> str:
+    return library.name.partition(".")[0]
 
 
 def compile_native(
@@ -155,7 +161,8 @@ def compile_native(
         values = [f"-D{name}={value}" for name, value in settings.items()]
         configure = [tools.cmake, *folders, *values]
         with log.open("w") as output:
-            for command in (configure, [tools.cmake, "--build", build]):
+            make = [tools.cmake, "--build", build, "--target", module_name(library)]
+            for command in (configure, make):
                 code = subprocess.run(
                     list(map(str, command)), stdout=output, stderr=subprocess.STDOUT
                 ).returncode

@@ -43,29 +43,50 @@ class Segments:
     grazing: Bools
 
 
+@dataclass(frozen=True)
+class PixelSamples:
+    """The samples of an image with one a pixel and the seed 0, row by row.
+
+    origin: (3,) float32. directions: (N, 3) float32, of the camera rays. light: (N, 2),
+    the random numbers that choose a point of the light.
+    """
+
+    origin: npt.NDArray[np.float32]
+    directions: npt.NDArray[np.float32]
+    light: Doubles
+
+
+def pixel_samples(prepared: PreparedScene) -> PixelSamples:
+    arrays = prepared.arrays
+    camera, film = dataclasses.asdict(arrays.camera), dataclasses.asdict(arrays.film)
+    width, count = arrays.film.width, arrays.film.width * arrays.film.height
+    directions, light = np.empty((count, 3), np.float32), np.empty((count, 2))
+    for pixel in range(count):
+        stream = core.render_selftest.sampler_stream(0, count, 1, pixel, 0, 4)
+        row, column = divmod(pixel, width)
+        x, y = np.float32(column) + np.float32(stream[0]), np.float32(row) + stream[1]
+        directions[pixel] = core.render_selftest.camera_direction(camera, film, x, y)
+        light[pixel] = stream[2:]
+    return PixelSamples(np.array(arrays.camera.origin, np.float32), directions, light)
+
+
 def traced_segments(prepared: PreparedScene, primitive: npt.NDArray[np.int32]) -> Segments:
-    """The segments of an image with one sample a pixel and the seed 0.
+    """The segments of the image of `pixel_samples`.
 
     primitive: (H, W), the face that each pixel's sample hit, which is decided exactly.
     """
     arrays = prepared.arrays
     selftest = core.render_selftest
-    camera, film = dataclasses.asdict(arrays.camera), dataclasses.asdict(arrays.film)
-    height, width = primitive.shape
     # What glows comes last and is not looked at.
     count = arrays.shapes[0].face_count
     hits = [i for i, face in enumerate(primitive.ravel()) if 0 <= face < count]
-    directions, targets = np.empty((len(hits), 3)), np.empty((len(hits), 3))
-    origin = np.array(arrays.camera.origin, np.float32)
+    samples = pixel_samples(prepared)
+    origin, directions = samples.origin, samples.directions[hits].astype(np.float64)
+    targets = np.empty((len(hits), 3))
     for i, pixel in enumerate(hits):
-        x, y, *light = selftest.sampler_stream(0, height * width, 1, pixel, 0, 4)
-        row, column = divmod(pixel, width)
-        place = np.float32(column) + np.float32(x), np.float32(row) + np.float32(y)
-        direction = selftest.camera_direction(camera, film, *place)
-        directions[i] = direction
-        face = int(primitive.flat[pixel])
+        direction, face = samples.directions[pixel], int(primitive.flat[pixel])
         point = selftest.hit_surface(prepared.handle, origin, direction, face)["p"]
-        sample = selftest.sample_emitter(prepared.handle, point, *light)
+        sample = selftest.sample_emitter(prepared.handle, point, *samples.light[pixel])
         targets[i] = sample["target"]
     faces = primitive.ravel()[hits].astype(np.int64)
     corners = triangles_of(arrays)[faces]

@@ -18,8 +18,8 @@ from .contenders import QUALITIES, embree_device
 from .frame_runs import FrameRun, measured_in_turns
 from .measure import Timing, best, waiting_seconds
 from .native import Native
-from .rays_contenders import RayContender, Variant, ray_contenders
-from .rays_goals import ray_speedup
+from .rays_contenders import RayContender, Variant, inexact_contender, ray_contenders
+from .rays_goals import cost_of_exactness, ray_speedup
 from .scenes import BenchScene
 from .status import show_status
 from .table import plural
@@ -60,9 +60,16 @@ class Traced:
 
 
 class RayBenchmark:
-    """All measurements of one scene."""
+    """All measurements of one scene. ``inexact``: the native side that is not exact, if it
+    is to be measured as well."""
 
-    def __init__(self, native: Native, scene: BenchScene, settings: Settings) -> None:
+    def __init__(
+        self,
+        native: Native,
+        scene: BenchScene,
+        settings: Settings,
+        inexact: Native | None = None,
+    ) -> None:
         self._module = native.module
         self._scene = scene
         self._settings = settings
@@ -80,6 +87,10 @@ class RayBenchmark:
                 )
                 for quality in QUALITIES
             }
+            self._inexact = None if inexact is None else inexact.module
+            if self._inexact is not None:
+                mesh = self._inexact.Mesh(scene.vertices, scene.faces)
+                self._inexact_tree = self._inexact.KdTree(mesh, {"builder": "auto"})
         self._image = np.zeros((side, side), np.float32)
 
     def facts(self) -> dict[str, Any]:
@@ -119,6 +130,15 @@ class RayBenchmark:
                     self._settings.trace,
                     self._settings.tiles,
                 )
+                if self._inexact is not None:
+                    contenders.append(
+                        inexact_contender(
+                            self._inexact_tree,
+                            self._inexact.View(self._scene.view, side, side, grid),
+                            self._settings.trace,
+                            self._settings.tiles,
+                        )
+                    )
                 with thread_count(max(self._settings.threads)):
                     facts = self._agreement(contenders, view, spp, shadows)
                 with thread_count(1):
@@ -248,6 +268,7 @@ class RayBenchmark:
             ],
         }
         block["speedup"] = ray_speedup(self._scene.name, block).as_dict()
+        block["exactness"] = cost_of_exactness(block)
         return block
 
 

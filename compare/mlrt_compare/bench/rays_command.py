@@ -11,7 +11,7 @@ from .checkout import find_checkout
 from .errors import BenchError
 from .figures import measure_scenes, new_figures, show
 from .machine import machine_record
-from .native import Native, load_native
+from .native import INEXACT, Native, load_native
 from .options import default_cache
 from .rays import RayBenchmark, Settings
 from .scenes import BenchScene, chosen_scenes, scenes_of_rays
@@ -23,6 +23,7 @@ def run(options: argparse.Namespace) -> bool:
     scenes = chosen_scenes(options.scenes, scenes_of_rays(source))
     cache = options.cache or default_cache()
     native = load_native(source, cache)
+    inexact = load_native(source, cache, INEXACT) if options.inexact else None
     check_trace(native, options.trace)
     settings = Settings(
         options.threads,
@@ -36,7 +37,7 @@ def run(options: argparse.Namespace) -> bool:
     show(rays_table.head_lines(figures["machine"], figures["settings"]))
 
     def measure(loaded: BenchScene, scene: dict[str, Any]) -> None:
-        benchmark = RayBenchmark(native, loaded, settings)
+        benchmark = RayBenchmark(native, loaded, settings, inexact)
         scene |= {"triangles": len(loaded.faces), **benchmark.facts(), "blocks": []}
         for block in benchmark.blocks():
             scene["blocks"].append(block)

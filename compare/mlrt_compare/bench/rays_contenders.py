@@ -9,6 +9,8 @@ from typing import Any
 from .contenders import EMBREE, MLRT, QUALITIES
 from .frame_runs import FrameRun
 
+INEXACT = "inexact"
+"""The kind of MLRT that trusts single precision."""
 EMBREE_MODES = {"r16": ("r16",), "NM": ("NM8", "NM16"), "1M": ("1M",)}
 """Ways in which Embree takes many rays, by what the native side calls their variants:
 coherent packets of 16, coherent streams of packets of 8 or 16, incoherent streams."""
@@ -77,3 +79,20 @@ def ray_contenders(
             ]
             contenders.append(RayContender(EMBREE, f"{quality} {mode}", variants))
     return contenders
+
+
+def inexact_contender(
+    tree: Any, view: Any, trace: dict[str, Any], tiles: Sequence[int]
+) -> RayContender:
+    """MLRT with a core that trusts single precision; tree and view are of its module."""
+
+    def variant(tile: int) -> Variant:
+        return Variant(
+            "group",
+            tile,
+            lambda _, image, **keywords: tree.render(
+                view, trace, image, tile=tile, **keywords
+            ),
+        )
+
+    return RayContender(MLRT, INEXACT, [variant(tile) for tile in tiles])

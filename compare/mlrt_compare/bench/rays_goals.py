@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .contenders import EMBREE, MLRT
-from .measure import best
+from .measure import best, median
+from .rays_contenders import INEXACT
 from .speedup import Speedup, frame_seconds, speedup
 
 Work = tuple[int, bool]
@@ -39,6 +40,23 @@ def ray_speedup(scene: str, block: dict[str, Any]) -> Speedup:
     own = next(c for c in contenders if c["engine"] == MLRT)
     goals = GOALS.get((block["spp"], block["shadows"]), {})
     return speedup(own, peers_of(block), *goals.get(scene, (None, None)))
+
+
+def cost_of_exactness(block: dict[str, Any]) -> dict[str, float] | None:
+    """Seconds of MLRT over those of MLRT that trusts single precision, if that was
+    measured: the best and the median on the clock, and the best in CPU time."""
+    own = next(c for c in block["contenders"] if c["engine"] == MLRT)
+    inexact = [c for c in block["contenders"] if c["name"] == f"{MLRT} {INEXACT}"]
+    if not inexact:
+        return None
+    return {
+        name: pick(frame_seconds(own, clock)) / pick(frame_seconds(inexact[0], clock))
+        for name, pick, clock in (
+            ("best", best, "wall"),
+            ("median", median, "wall"),
+            ("cpu", best, "cpu"),
+        )
+    }
 
 
 def peers_of(block: dict[str, Any]) -> list[dict[str, Any]]:

@@ -1,0 +1,115 @@
+// Rows and columns: from values side by side to values one above the other, and back.
+#pragma once
+
+#include "base/simd.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace mlrt {
+
+// Rows of eight values as columns: result[i] holds value i of each row.
+inline std::array<FloatBlock, 8>
+load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
+#if defined(__AVX__)
+    const auto row = [&](int i) { return _mm256_loadu_ps(rows[i]); };
+    __m256 pair[8], quad[8];
+    for (int i = 0; i < 8; i += 2) {
+        pair[i] = _mm256_unpacklo_ps(row(i), row(i + 1));
+        pair[i + 1] = _mm256_unpackhi_ps(row(i), row(i + 1));
+    }
+    for (int i = 0; i < 8; i += 4)
+        for (int j = 0; j < 2; ++j) {
+            const __m256 a = pair[i + j], b = pair[i + 2 + j];
+            quad[i + 2 * j] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(1, 0, 1, 0));
+            quad[i + 2 * j + 1] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(3, 2, 3, 2));
+        }
+    std::array<FloatBlock, 8> columns;
+    for (int i = 0; i < 4; ++i) {
+        columns[i] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x20));
+        columns[i + 4] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x31));
+    }
+    return columns;
+#else
+    std::array<FloatBlock, 8> columns;
+    for (uint32_t i = 0; i < BLOCK_WIDTH; ++i) {
+        std::array<float, BLOCK_WIDTH> column;
+        for (uint32_t j = 0; j < BLOCK_WIDTH; ++j)
+            column[j] = rows[j][i];
+        columns[i] = drjit::load<FloatBlock>(column.data());
+    }
+    return columns;
+#endif
+}
+
+inline std::array<FloatPacket, 8>
+load_columns(const std::array<const float *, PACKET_WIDTH> &rows) {
+    std::array<const float *, BLOCK_WIDTH> low, high;
+    std::copy_n(rows.begin(), BLOCK_WIDTH, low.begin());
+    std::copy_n(rows.begin() + BLOCK_WIDTH, BLOCK_WIDTH, high.begin());
+    const std::array<FloatBlock, 8> a = load_columns(low), b = load_columns(high);
+    std::array<FloatPacket, 8> columns;
+    for (size_t i = 0; i < 8; ++i)
+        columns[i] = FloatPacket(a[i], b[i]);
+    return columns;
+}
+
+// Sixteen packets, and a value of each.
+using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
+
+namespace simd_detail {
+
+#if defined(__AVX512F__)
+// `better` keeps one of two values a lane. Halves the number of packets and of the values
+// that are left of each, four times.
+template <typename Better>
+FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
+    FloatPacket two[8], four[4];
+    for (int i = 0; i < 8; ++i) {
+        const __m512 a = rows[size_t(2 * i)].m, b = rows[size_t(2 * i + 1)].m;
+        two[i] = better(FloatPacket(_mm512_unpacklo_ps(a, b)),
+                        FloatPacket(_mm512_unpackhi_ps(a, b)));
+    }
+    for (int i = 0; i < 4; ++i) {
+        const __m512d a = _mm512_castps_pd(two[2 * i].m);
+        const __m512d b = _mm512_castps_pd(two[2 * i + 1].m);
+        four[i] = better(FloatPacket(_mm512_castpd_ps(_mm512_unpacklo_pd(a, b))),
+                         FloatPacket(_mm512_castpd_ps(_mm512_unpackhi_pd(a, b))));
+    }
+    const auto halved = [&](const FloatPacket &a, const FloatPacket &b) {
+        return better(FloatPacket(_mm512_shuffle_f32x4(a.m, b.m, 0x88)),
+                      FloatPacket(_mm512_shuffle_f32x4(a.m, b.m, 0xdd)));
+    };
+    return halved(halved(four[0], four[1]), halved(four[2], four[3]));
+}
+#endif
+
+} // namespace simd_detail
+
+// Lane i of the result is the least lane of packet i. Lanes must be ordered (no NaN).
+inline FloatPacket least_lanes(const PacketRows &rows) {
+#if defined(__AVX512F__)
+    return simd_detail::best_lanes(rows, minimum<FloatPacket>);
+#else
+    LaneArray<float> least;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
+        least[i] = least_lane(rows[i]);
+    return load<FloatPacket>(least);
+#endif
+}
+
+// The same of the greatest lanes.
+inline FloatPacket greatest_lanes(const PacketRows &rows) {
+#if defined(__AVX512F__)
+    return simd_detail::best_lanes(rows, maximum<FloatPacket>);
+#else
+    LaneArray<float> greatest;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
+        greatest[i] = greatest_lane(rows[i]);
+    return load<FloatPacket>(greatest);
+#endif
+}
+
+} // namespace mlrt
