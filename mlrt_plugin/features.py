@@ -8,7 +8,10 @@ from .elements import Element
 from .errors import UnsupportedFeature
 from .scene_arrays import Feature
 
-SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
+SHAPES = (
+    *("obj", "ply", "serialized", "rectangle", "cube", "mesh"),
+    *("sphere", "disk", "cylinder", "shapegroup", "instance"),
+)
 BSDFS = ("diffuse", "twosided")
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)
@@ -68,6 +71,8 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin == "instance" and element.properties.get("loaded"):
+        return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(

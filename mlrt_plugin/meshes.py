@@ -79,6 +79,9 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         flipped.append(bool(shape.has_flipped_normals()))
         vertex_count += len(points)
         face_count += len(corners)
+    if not shapes:
+        vertices = normals = [np.zeros((0, 3), np.float32)]
+        faces = [np.zeros((0, 3), np.uint32)]
     if vertex_count > 0xFFFFFFFF:
         raise SceneError(
             f"the scene has {vertex_count} vertices, more than 2**32: split it"
@@ -90,7 +93,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         if any(interpolated)
         else np.zeros((0, 3), np.float32),
         first_faces=first_faces,
-        face_counts=[len(f) for f in faces],
+        face_counts=[len(f) for f in faces] if shapes else [],
         vertex_normals=interpolated,
         flip_normals=flipped,
         dropped=not_finite,

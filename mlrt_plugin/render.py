@@ -15,6 +15,7 @@ from ._dispatch import core
 from .emitters import check_distances
 from .errors import MlrtError, warn_of
 from .integrators import own_aovs
+from .object_set import SceneHits, add_timings, common_bounds, obtain_objects, scene_hits
 from .options import (
     AOVS,
     BUILD_OPTIONS,
@@ -23,10 +24,11 @@ from .options import (
     integer,
     split_options,
 )
-from .scene_arrays import Lighting, SceneArrays, same_geometry
+from .scene_arrays import Lighting, SceneArrays, Shape, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
 from .threads import thread_count
+from .tree import ray_arrays, trace_options
 from .tree_cache import ObtainedTree, obtain_tree
 from .tree_report import invisible_meshes, tree_report
 
@@ -75,6 +77,7 @@ class PreparedScene:
     timings: dict[str, float]
     tree_warnings: tuple[str, ...] = ()
     shading: ShadingChoice = NATIVE
+    objects: Any = None
 
     @property
     def lighting(self) -> Lighting:
@@ -99,6 +102,46 @@ class PreparedScene:
         """The tree if it is that of other arrays too, bit for bit, else None."""
         same = build_options == self.build_options and same_geometry(self.arrays, arrays)
         return self.tree if same else None
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """All shapes, by the numbers that `closest_hit` gives."""
+        return all_shapes(self.arrays)
+
+    @property
+    def shape_names(self) -> tuple[str, ...]:
+        """What messages call them."""
+        others = self.arrays.objects
+        return self.arrays.shape_names + (others.shape_names if others is not None else ())
+
+    def closest_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> SceneHits:
+        """The nearest hit of each ray on any shape of the scene; arguments are those of
+        `KdTree.closest_hit`."""
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        return scene_hits(self.tree, self.objects, self.shapes, rays, options)
+
+    def any_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> npt.NDArray[np.bool_]:
+        """Whether any shape of the scene lies on each ray: (N,) bool."""
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        if self.objects is None:
+            found = self.tree.any_hit(*rays, trace_options(options))
+        else:
+            found = self.objects.any_hit(self.tree, *rays, trace_options(options))
+        return np.asarray(found).view(np.bool_)
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
@@ -217,18 +260,21 @@ def prepare(
         obtained = obtain_tree(arrays.vertices, arrays.faces, build, tree_cache)
     else:
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
-    check_distances(arrays.emitters, obtained.tree.bounds)
+    others = obtain_objects(arrays.objects, len(arrays.faces), build, tree_cache)
+    add_timings(obtained.timings, others.timings)
+    check_distances(arrays.emitters, common_bounds(obtained.tree, others.handle))
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,
         arrays.faces if len(arrays.normals) else arrays.faces[:0],
         arrays.normals,
-        [dataclasses.asdict(shape) for shape in arrays.shapes],
+        [dataclasses.asdict(shape) for shape in all_shapes(arrays)],
         arrays.materials,
         [dataclasses.asdict(emitter) for emitter in arrays.emitters],
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
+        others.handle,
     )
     return PreparedScene(
         arrays,
@@ -236,8 +282,9 @@ def prepare(
         obtained.tree,
         build,
         {"load": loaded - start, **obtained.timings},
-        obtained.warnings + invisible_meshes(obtained.tree, arrays),
+        obtained.warnings + others.warnings + invisible_meshes(obtained.tree, arrays),
         choice,
+        others.handle,
     )
 
 
@@ -309,6 +356,11 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
+
+
+def all_shapes(arrays: SceneArrays) -> tuple[Shape, ...]:
+    """The shapes of a scene in the order of their faces."""
+    return arrays.shapes + (arrays.objects.shapes if arrays.objects is not None else ())
 
 
 def checked_spp(spp: int) -> int:

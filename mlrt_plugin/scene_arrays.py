@@ -9,10 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from .object_arrays import ObjectArrays
 
 NONE = 0xFFFFFFFF
 """Marks the absence of a material, emitter or shape."""
@@ -152,7 +155,8 @@ class SceneArrays:
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
-    each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
+    each. shape_names: what messages call the shapes. objects: what is not in these arrays:
+    analytic shapes and instances. not_finite_faces: how many faces of
     each shape had a vertex that is not finite; they are points now.
     """
 
@@ -171,6 +175,7 @@ class SceneArrays:
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
     not_finite_faces: tuple[int, ...] = ()
+    objects: ObjectArrays | None = None
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):

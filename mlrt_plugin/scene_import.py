@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,12 @@ import numpy as np
 from . import camera as cameras
 from . import elements, emitters, features, integrators, meshes, parsing
 from . import mitsuba_objects as objects
+from . import scene_objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
+from .object_arrays import ObjectArrays
 from .options import integer
 from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
 
@@ -37,11 +39,15 @@ class SceneSummary:
 
 @dataclass(frozen=True)
 class LoadedScene:
-    """The objects of a loaded scene, each kind in the order of declaration."""
+    """The objects of a loaded scene, each kind in the order of declaration.
+
+    groups: the shapes of each shapegroup, by its id.
+    """
 
     shapes: list[Any]
     emitters: list[Any]
     sensors: list[Any]
+    groups: dict[str, list[Any]] = field(default_factory=dict)
 
     @staticmethod
     def of_parts(parts: list[Any]) -> LoadedScene:
@@ -131,7 +137,9 @@ def import_scene(
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
         parts, names = parsing.instantiate(parsed)
-        loaded = LoadedScene.of_parts(parts)
+        loaded = replace(
+            LoadedScene.of_parts(parts), groups=scene_objects.group_children(parsed, names)
+        )
     return collect(loaded, names, sensor, resolution, found, lighting, warnings)
 
 
@@ -297,17 +305,20 @@ def collect(
             )
         return str(element)
 
-    shapes, sources, sensor = scene.shapes, scene.emitters, scene.sensors[sensor_number]
+    by_way = scene_objects.sorted_shapes(scene.shapes, scene.groups, names)
+    shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
-    emitter_of_shape = [NONE] * len(shapes)
-    shape_of_emitter = [NONE] * len(sources)
-    for number, shape in enumerate(shapes):
-        own = shape.emitter()
-        for index, source in enumerate(sources):
-            if own is not None and own is source:
-                emitter_of_shape[number], shape_of_emitter[index] = index, number
+    others = scene_objects.gather_objects(
+        by_way,
+        names,
+        len(geometry.faces),
+        name_of,
+        lambda shape: materials.add(shape.bsdf(), name_of(shape)),
+        geometry.warnings,
+    )
+    shape_of_emitter, emitter_of_shape = lights_of_shapes(by_way, others, sources)
     film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
@@ -321,7 +332,7 @@ def collect(
                 first_face=geometry.first_faces[number],
                 face_count=geometry.face_counts[number],
                 material=materials.add(shape.bsdf(), shape_names[number]),
-                emitter=emitter_of_shape[number],
+                emitter=emitter_of_shape.get(number, NONE),
                 vertex_normals=geometry.vertex_normals[number],
                 flip_normals=geometry.flip_normals[number],
             )
@@ -343,12 +354,50 @@ def collect(
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
+        objects=with_lights(others, len(shapes), emitter_of_shape),
     )
 
 
+def lights_of_shapes(
+    by_way: scene_objects.SortedShapes, others: ObjectArrays | None, sources: list[Any]
+) -> tuple[list[int], dict[int, int]]:
+    """The number of the shape that each emitter is on, NONE for none, and the number of the
+    emitter of each shape that glows. Shapes are numbered as the core does: meshes, then
+    those of `others`."""
+    glowing = {}
+    for number, shape in enumerate(by_way.meshes):
+        if shape.emitter() is not None:
+            glowing[number] = shape.emitter()
+    if others is not None:
+        first = len(by_way.meshes) + len(others.shapes) - len(others.analytic_types)
+        for number, shape in enumerate(by_way.analytic):
+            if shape.emitter() is not None:
+                glowing[first + number] = shape.emitter()
+    shape_of_emitter = [NONE] * len(sources)
+    emitter_of_shape = {}
+    for number, own in glowing.items():
+        for index, source in enumerate(sources):
+            if own is source:
+                emitter_of_shape[number], shape_of_emitter[index] = index, number
+    return shape_of_emitter, emitter_of_shape
+
+
+def with_lights(
+    others: ObjectArrays | None, first: int, emitter_of_shape: Mapping[int, int]
+) -> ObjectArrays | None:
+    """Objects whose shapes know their emitters; the first of them has the number `first`."""
+    if others is None:
+        return None
+    shapes = tuple(
+        replace(shape, emitter=emitter_of_shape.get(first + number, NONE))
+        for number, shape in enumerate(others.shapes)
+    )
+    return replace(others, shapes=shapes)
+
+
 def rectangle_corners(geometry: meshes.Geometry, shapes: list[Any], number: int) -> Any:
-    """(4, 3) vertices of a shape if it is a rectangle, else None."""
-    if number == NONE or objects.plugin_name(shapes[number]) != "rectangle":
+    """(4, 3) vertices of a mesh if it is a rectangle, else None."""
+    if number >= len(shapes) or objects.plugin_name(shapes[number]) != "rectangle":
         return None
     first = geometry.first_faces[number]
     indices = np.unique(geometry.faces[first : first + geometry.face_counts[number]])

@@ -118,6 +118,9 @@ inline FloatPacket arc_cosine(const FloatPacket &a) {
 inline FloatPacket sine(const FloatPacket &a) {
     return drjit::sin(a);
 }
+inline FloatPacket cosine(const FloatPacket &a) {
+    return drjit::cos(a);
+}
 
 // a * b + c, rounded once: every processor we build for has it as an instruction.
 template <typename T>

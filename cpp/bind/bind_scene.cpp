@@ -1,6 +1,7 @@
 // The class Scene: arrays and dicts of an imported scene, checked once.
 #include "bind/bind.h"
 #include "bind/fields.h"
+#include "bind/objects_handle.h"
 #include "bind/scene_handle.h"
 #include "bind/tree_handle.h"
 #include "render/filter.h"
@@ -50,6 +51,10 @@ std::vector<Material> materials_from(const Array<float> &array) {
     return materials;
 }
 
+bool is_object(const SceneData &scene, const Shape &shape) {
+    return scene.objects && shape.first_face >= scene.objects->first_face;
+}
+
 Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scene,
                  size_t emitter_count) {
     Fields fields(dict, name);
@@ -61,7 +66,8 @@ Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scen
     shape.vertex_normals = fields.boolean("vertex_normals", false);
     shape.flip_normals = fields.boolean("flip_normals", false);
     fields.finish();
-    if (shape.vertex_normals && (scene.faces.empty() || scene.normals.empty()))
+    if (shape.vertex_normals && !is_object(scene, shape) &&
+        (scene.faces.empty() || scene.normals.empty()))
         refuse_value(name + " has vertex normals, but faces or normals are empty.");
     return shape;
 }
@@ -113,8 +119,34 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     return emitter;
 }
 
+// An analytic shape, or some faces of one group.
+void check_object(const SceneData &scene, const Shape &shape, const std::string &name) {
+    const ObjectSet &objects = *scene.objects;
+    if (objects.is_analytic(shape.first_face)) {
+        if (shape.face_count != 1 || shape.vertex_normals)
+            refuse_value(name + " is analytic and must have one face, without normals.");
+        if (shape.emitter != NONE &&
+            shape.first_face - objects.first_analytic_face >= objects.scene_analytic_count)
+            refuse_value(name + " glows, but belongs to a group.");
+        return;
+    }
+    if (shape.emitter != NONE)
+        refuse_value(name + " glows, but belongs to a group.");
+    for (const ObjectGroup &group : objects.groups)
+        if (group.tree && shape.first_face >= group.first_face &&
+            shape.first_face - group.first_face < group.tree->triangles.size()) {
+            if (shape.face_count >
+                group.tree->triangles.size() - (shape.first_face - group.first_face))
+                refuse_value(name + " must not have faces of several groups.");
+            if (shape.vertex_normals && group.faces.empty())
+                refuse_value(name + " has vertex normals, but its group has none.");
+        }
+}
+
 // Shapes cover the faces in order, and refer to their emitters as these refer to them.
 void check_shapes(const SceneData &scene) {
+    const uint64_t face_count =
+        scene.objects ? scene.objects->face_end() : scene.tree->triangles.size();
     uint64_t next_face = 0;
     for (size_t i = 0; i < scene.shapes.size(); ++i) {
         const Shape &shape = scene.shapes[i];
@@ -123,7 +155,11 @@ void check_shapes(const SceneData &scene) {
             refuse_value(name + " must begin at face " + std::to_string(next_face) +
                          ", where the one before it ends.");
         next_face += shape.face_count;
-        if (next_face > scene.tree->triangles.size())
+        if (is_object(scene, shape))
+            check_object(scene, shape, name);
+        else if (scene.objects && next_face > scene.objects->first_face)
+            refuse_value(name + " must not have faces of the tree and of objects.");
+        if (next_face > face_count)
             break;
         if (shape.emitter != NONE &&
             (scene.emitters[shape.emitter].type != EmitterType::area ||
@@ -131,10 +167,10 @@ void check_shapes(const SceneData &scene) {
             refuse_value(name +
                          " glows, but its emitter is not an area light of this shape.");
     }
-    if (next_face != scene.tree->triangles.size())
+    if (next_face != face_count)
         refuse_value("shapes cover " + std::to_string(next_face) +
-                     " faces, but the tree has " +
-                     std::to_string(scene.tree->triangles.size()) + ".");
+                     " faces, but the tree and the objects have " +
+                     std::to_string(face_count) + ".");
     for (size_t i = 0; i < scene.emitters.size(); ++i) {
         const Emitter &emitter = scene.emitters[i];
         if (emitter.type != EmitterType::area)
@@ -152,7 +188,7 @@ void check_vertices(const SceneData &scene) {
                      " rows, but the tree has " +
                      std::to_string(scene.tree->triangles.size()) + " triangles.");
     for (const Shape &shape : scene.shapes) {
-        if (!shape.vertex_normals)
+        if (!shape.vertex_normals || is_object(scene, shape))
             continue;
         for (uint32_t i = shape.first_face; i < shape.first_face + shape.face_count; ++i)
             for (const uint32_t vertex : scene.faces[i])
@@ -169,9 +205,15 @@ void check_vertices(const SceneData &scene) {
 SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &normals, const nb::list &shapes,
                        const Array<float> &materials, const nb::list &emitters,
-                       const nb::dict &camera, const nb::dict &film, bool hide_emitters) {
+                       const nb::dict &camera, const nb::dict &film, bool hide_emitters,
+                       const nb::object &objects) {
     SceneData scene;
     scene.tree = tree.tree;
+    if (!objects.is_none()) {
+        scene.objects = nb::cast<const ObjectsHandle &>(objects).objects;
+        if (scene.objects->first_face != scene.tree->triangles.size())
+            refuse_value("objects must begin at the face after the last of the tree.");
+    }
     scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
     scene.normals = rows<Vec3f>(normals, "normals");
     scene.materials = materials_from(materials);
@@ -269,10 +311,12 @@ void bind_scene(nb::module_ &m) {
             nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
             nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"), nb::arg("camera"),
             nb::arg("film"), nb::arg("hide_emitters") = false,
+            nb::arg("objects") = nb::none(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
             "vertex normals. normals: float32 (V, 3) or (0, 3). shapes, emitters: lists of "
             "dicts, camera, film: dicts; keys are the fields of the structs in "
             "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
+            "objects: Objects beside the tree, or None; shapes cover their faces too. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

@@ -1,6 +1,8 @@
 #include "render/tile.h"
 
+#include "objects/trace_objects.h"
 #include "render/emitter_sampling.h"
+#include "render/object_surface.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
 
@@ -73,6 +75,8 @@ void TileRenderer::make_room() {
     primitive_.resize(padded);
     std::fill(primitive_.begin() + ptrdiff_t(samples_.count()), primitive_.end(),
               NO_PRIMITIVE);
+    if (scene_.data.objects)
+        instance_.resize(padded, NO_INSTANCE);
     values_.resize(target_.channels.count);
     for (std::vector<float> &channel : values_)
         channel.assign(padded, 0.0f);
@@ -102,10 +106,36 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     tile.size = group.side;
     tile.samples = group.sample_count;
     const bool is_square = group.side > 0 && x >= 0 && y >= 0;
-    const bool wants_distances = target_.channels.depth >= 0;
-    trace_closest(*scene_.data.tree, rays, options_,
-                  HitGroup{wants_distances ? t_.data() : nullptr, primitive_.data()},
-                  counters_.primary, is_square ? &tile : nullptr);
+    const bool wants_distances = target_.channels.depth >= 0 || scene_.data.objects;
+    trace(rays, is_square ? &tile : nullptr, wants_distances ? t_.data() : nullptr,
+          primitive_.data(), instance_.data());
+}
+
+// Instances are written only if the scene has objects, and distances are needed then.
+void TileRenderer::trace(const RayGroup &rays, const CameraTile *tile, float *t,
+                         uint32_t *primitive, uint32_t *instance) {
+    trace_closest(*scene_.data.tree, rays, options_, HitGroup{t, primitive},
+                  counters_.primary, tile);
+    if (scene_.data.objects)
+        trace_closest_objects(*scene_.data.objects, rays, {t, primitive, instance},
+                              counters_.primary);
+}
+
+SurfacePoint<FloatPacket> TileRenderer::surface_of(const HitPacket &hit,
+                                                   bool common_origin) const {
+    const LaneBits on_objects = lanes_on_objects(scene_, hit.faces, hit.lanes);
+    const LaneBits on_meshes = hit.lanes & ~on_objects;
+    SurfacePoint<FloatPacket> point{in_all_lanes({}), in_all_lanes({}), in_all_lanes({})};
+    if (on_meshes != 0)
+        point = common_origin
+                    ? hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces,
+                                   on_meshes)
+                    : hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, on_meshes);
+    if (on_objects != 0)
+        place_object_surfaces(scene_,
+                              {hit.origin, hit.direction, hit.t, hit.faces, hit.instances},
+                              on_objects, point);
+    return point;
 }
 
 void TileRenderer::shade_hits() {
@@ -122,8 +152,11 @@ void TileRenderer::shade_hits() {
             hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
         hit.light_x = load<FloatPacket>(samples_.light_x() + first);
         hit.light_y = load<FloatPacket>(samples_.light_y() + first);
-        const SurfacePoint<FloatPacket> point =
-            hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces, hit.lanes);
+        if (scene_.data.objects) {
+            hit.t = load<FloatPacket>(&t_[first]);
+            hit.instances = load<UIntPacket>(&instance_[first]);
+        }
+        const SurfacePoint<FloatPacket> point = surface_of(hit, true);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
@@ -237,7 +270,12 @@ void TileRenderer::pass_hidden_emitters() {
                 d[k].push_back(samples_.direction(k)[ray]);
         const std::vector<float> t_min(count, 0.0f);
         const std::vector<float> t_max(count, std::numeric_limits<float>::max());
-        std::vector<uint32_t> primitive(count);
+        Hits hits;
+        hits.primitive.resize(count);
+        if (scene_.data.objects) {
+            hits.t.resize(count);
+            hits.instance.resize(count);
+        }
 
         RayGroup group;
         group.count = uint32_t(count);
@@ -247,26 +285,28 @@ void TileRenderer::pass_hidden_emitters() {
         }
         group.t_min = t_min.data();
         group.t_max = t_max.data();
-        trace_closest(*scene_.data.tree, group, options_,
-                      HitGroup{nullptr, primitive.data()}, counters_.primary);
+        trace(group, nullptr, scene_.data.objects ? hits.t.data() : nullptr,
+              hits.primitive.data(), hits.instance.data());
         for (size_t first = 0; first < count; first += PACKET_WIDTH)
-            shade_passed(passing, primitive, first);
+            shade_passed(passing, hits, first);
     }
 }
 
-void TileRenderer::shade_passed(const PassingRays &passing,
-                                const std::vector<uint32_t> &primitive, size_t first) {
+void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
+                                size_t first) {
     HitPacket hit;
-    LaneArray<uint32_t> rays, faces;
-    LaneArray<float> origin[3], d[3], light_x, light_y;
+    LaneArray<uint32_t> rays, faces, instances;
+    LaneArray<float> origin[3], d[3], light_x, light_y, t;
     // Lanes behind the last ray repeat it.
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
         const size_t i = std::min(first + lane, passing.ray.size() - 1);
         const uint32_t ray = passing.ray[i];
-        const bool hits = i == first + lane && primitive[i] != NO_PRIMITIVE;
-        hit.lanes |= LaneBits(hits) << lane;
+        const bool is_hit = i == first + lane && hits.primitive[i] != NO_PRIMITIVE;
+        hit.lanes |= LaneBits(is_hit) << lane;
         rays[lane] = ray;
-        faces[lane] = primitive[i];
+        faces[lane] = hits.primitive[i];
+        t[lane] = scene_.data.objects ? hits.t[i] : 0;
+        instances[lane] = scene_.data.objects ? hits.instance[i] : NO_INSTANCE;
         for (int k = 0; k < 3; ++k) {
             origin[k][lane] = passing.origin[k][i];
             d[k][lane] = samples_.direction(k)[ray];
@@ -284,14 +324,16 @@ void TileRenderer::shade_passed(const PassingRays &passing,
     hit.faces = load<UIntPacket>(faces);
     hit.light_x = load<FloatPacket>(light_x);
     hit.light_y = load<FloatPacket>(light_y);
-    shade(hit, hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes));
+    hit.t = load<FloatPacket>(t);
+    hit.instances = load<UIntPacket>(instances);
+    shade(hit, surface_of(hit, false));
 }
 
 void TileRenderer::add_reflected_light() {
     float *cost = target_.cost ? cost_.data() : nullptr;
     float *red = values_[0].data(), *green = values_[1].data(), *blue = values_[2].data();
     for (ShadowRays &shadow : shadows_)
-        shadow.trace(*scene_.data.tree, options_, counters_.shadow, cost,
+        shadow.trace(scene_.data, options_, counters_.shadow, cost,
                      [&](uint32_t ray, Vec3f light) {
                          red[ray] += light.x;
                          green[ray] += light.y;

@@ -73,6 +73,9 @@ private:
         UIntPacket ray, faces;
         Vec3<FloatPacket> origin, direction;
         FloatPacket light_x, light_y;
+        // If the scene has objects: the distance, and the instance or NO_INSTANCE.
+        FloatPacket t;
+        UIntPacket instances;
     };
 
     // Camera rays that go on behind an emitter that is to be hidden.
@@ -84,14 +87,21 @@ private:
     void make_room();
     void trace_camera_rays(const PixelGroup &group);
     void shade_hits();
+    SurfacePoint<FloatPacket> surface_of(const HitPacket &hit, bool common_origin) const;
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
     void pass_hidden_emitters();
-    void shade_passed(const PassingRays &passing, const std::vector<uint32_t> &primitive,
-                      size_t first);
+    // What rays hit, by ray; distances and instances only if they are wanted.
+    struct Hits {
+        std::vector<float> t;
+        std::vector<uint32_t> primitive, instance;
+    };
+    void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
+               uint32_t *instance);
+    void shade_passed(const PassingRays &passing, const Hits &hits, size_t first);
     void add_reflected_light();
     void write(const PixelGroup &group);
 
@@ -104,8 +114,9 @@ private:
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.
-    std::vector<float> t_; // if the depth is wanted
+    std::vector<float> t_; // if the depth is wanted, or the scene has objects
     std::vector<uint32_t> primitive_;
+    std::vector<uint32_t> instance_;         // if the scene has objects
     std::vector<float> cost_;                // if it is wanted
     std::vector<std::vector<float>> values_; // by channel of the film
 
