@@ -12,9 +12,8 @@ import mitsuba as mi
 import numpy as np
 
 from . import camera as cameras
-from . import elements, emitters, features, integrators, meshes, parsing
+from . import elements, emitters, features, integrators, meshes, parsing, scene_objects
 from . import mitsuba_objects as objects
-from . import scene_objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
@@ -385,7 +384,7 @@ def lights_of_shapes(
 def with_lights(
     others: ObjectArrays | None, first: int, emitter_of_shape: Mapping[int, int]
 ) -> ObjectArrays | None:
-    """Objects whose shapes know their emitters; the first of them has the number `first`."""
+    """Objects whose shapes know their emitters; `first` is the number of the first."""
     if others is None:
         return None
     shapes = tuple(

@@ -166,8 +166,8 @@ def frame_of(shape: Any, name: str, warnings: list[str]) -> npt.NDArray[np.float
     sizes = np.linalg.norm(frame[:, :3], axis=0)
     if abs(np.linalg.det(frame[:, :3])) <= 1e-12 * np.prod(sizes) or not sizes.all():
         raise SceneError(
-            f"{name} has no extent: its radius, the way from p0 to p1 and the scales of its "
-            "to_world must not be 0"
+            f"{name} has no extent: its radius, the way from p0 to p1 and the scales of "
+            "its to_world must not be 0"
         )
     if objects.plugin_name(shape) == "sphere":
         stretch = np.linalg.svd(frame[:, :3], compute_uv=False)

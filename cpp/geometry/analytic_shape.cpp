@@ -132,21 +132,10 @@ float nearest_crossing(const AnalyticShape &shape, Vec3d origin, Vec3d direction
     return INFINITE;
 }
 
-AnalyticPoint analytic_point(const AnalyticShape &shape, Vec3d origin, Vec3d direction,
-                             float t) {
-    // The distance again, without its rounding.
-    double exact = t;
-    const Crossings crossings = crossings_of(shape, origin, direction);
-    for (int i = 0; i < crossings.count; ++i)
-        if (float(crossings.t[i]) == t) {
-            exact = crossings.t[i];
-            break;
-        }
-    const Vec3d p = origin + direction * exact;
+AnalyticPoint point_on(const AnalyticShape &shape, Vec3d p) {
     const Affine &frame = shape.frame;
     switch (shape.type) {
     case AnalyticType::sphere: {
-        // Put back onto the surface, as in Mitsuba's sphere.cpp.
         const Vec3d normal = normalize(p - frame.origin);
         return {frame.origin + normal * shape.radius, normal};
     }
@@ -166,6 +155,19 @@ AnalyticPoint analytic_point(const AnalyticShape &shape, Vec3d origin, Vec3d dir
     }
     }
     return {};
+}
+
+AnalyticPoint analytic_point(const AnalyticShape &shape, Vec3d origin, Vec3d direction,
+                             float t) {
+    // The distance again, without its rounding.
+    double exact = t;
+    const Crossings crossings = crossings_of(shape, origin, direction);
+    for (int i = 0; i < crossings.count; ++i)
+        if (float(crossings.t[i]) == t) {
+            exact = crossings.t[i];
+            break;
+        }
+    return point_on(shape, origin + direction * exact);
 }
 
 } // namespace mlrt

@@ -45,12 +45,17 @@ Crossings crossings_of(const AnalyticShape &shape, Vec3d origin, Vec3d direction
 float nearest_crossing(const AnalyticShape &shape, Vec3d origin, Vec3d direction,
                        float t_min, float t_max);
 
-// The surface where a ray meets it, at the crossing that rounds to t. The normal has unit
+// A point of the surface with its normal. The normal has unit
 // length and points away from the centre of a sphere, along the normal of a disk, and,
 // unless the frame is mirrored, away from the axis of a cylinder, as Mitsuba has it.
 struct AnalyticPoint {
     Vec3d p, normal;
 };
+
+// A point that lies beside the surface by rounding, put back onto it.
+AnalyticPoint point_on(const AnalyticShape &shape, Vec3d beside);
+
+// Where a ray meets the surface, at the crossing that rounds to t.
 AnalyticPoint analytic_point(const AnalyticShape &shape, Vec3d origin, Vec3d direction,
                              float t);
 

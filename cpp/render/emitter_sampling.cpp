@@ -195,6 +195,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
             const AnalyticLight<Real> light =
                 sample_analytic(scene, *analytic, number, p, x, y);
             sample.target = light.p;
+            sample.target_face = all_of<Real>(scene.data.shapes[emitter.shape].first_face);
             sample.direction = light.direction;
             has_light = light.is_lit;
             factor = choice_weight / light.density;

@@ -1,6 +1,7 @@
 #include "render/object_surface.h"
 
 #include "objects/trace_objects.h"
+#include "render/shadow_offset.h"
 
 namespace mlrt {
 
@@ -28,6 +29,24 @@ SurfacePoint<float> group_triangle_surface(const ObjectGroup &group, const Shape
     const auto &[a, b, c] = group.faces[number];
     const Corners<float> normals{group.normals[a], group.normals[b], group.normals[c]};
     return triangle_surface(origin, direction, corners, &normals);
+}
+
+SurfacePlane<double> analytic_plane(const ObjectSet &objects, Vec3f origin, Vec3f direction,
+                                    float t, uint32_t face) {
+    const AnalyticShape &shape = objects.analytic[face - objects.first_analytic_face];
+    const AnalyticPoint point = analytic_point(shape, Vec3d(origin), Vec3d(direction), t);
+    return {point.p, point.normal, analytic_error(shape)};
+}
+
+SurfacePlane<double> triangle_plane(const ObjectGroup &group, Vec3f origin, Vec3f direction,
+                                    uint32_t face) {
+    const Triangle &triangle = group.tree->triangles[face - group.first_face];
+    return plane_at<float>(origin, direction, {triangle.a, triangle.b, triangle.c});
+}
+
+// |L| v for a vector v without negative components.
+Vec3d absolute_vector(const Affine &map, Vec3d v) {
+    return abs(map.axes[0]) * v.x + abs(map.axes[1]) * v.y + abs(map.axes[2]) * v.z;
 }
 
 Vec3f normal_to_world(const Instance &instance, Vec3f n) {
@@ -64,6 +83,31 @@ SurfacePoint<float> object_surface(const PreparedScene &scene, const ObjectHit &
     return point;
 }
 
+SurfacePlane<double> object_plane(const PreparedScene &scene, const ObjectHit &hit) {
+    const ObjectSet &objects = *scene.data.objects;
+    if (hit.instance == NO_INSTANCE)
+        return analytic_plane(objects, hit.origin, hit.direction, hit.t, hit.face);
+    const Instance &instance = objects.instances[hit.instance];
+    const auto [origin, direction] = to_group(instance, hit.origin, hit.direction);
+    const SurfacePlane<double> local =
+        objects.is_analytic(hit.face)
+            ? analytic_plane(objects, origin, direction, hit.t, hit.face)
+            : triangle_plane(objects.groups[instance.group], origin, direction, hit.face);
+
+    const Affine &map = instance.to_world, &back = instance.to_group;
+    SurfacePlane<double> plane;
+    plane.p = map.point(local.p);
+    // Normals are mapped by the transpose of the inverse.
+    for (int k = 0; k < 3; ++k)
+        plane.normal[k] = dot(back.axes[size_t(k)], local.normal);
+    plane.normal = normalize(plane.normal);
+    const Vec3d reach = abs(plane.p) + abs(map.origin);
+    const Vec3d inverse_error = absolute_vector(back, reach) * 0x1p-50;
+    plane.error =
+        absolute_vector(map, local.error + abs(local.p) * ROUNDING + inverse_error);
+    return plane;
+}
+
 LaneBits lanes_on_objects(const PreparedScene &scene, const UIntPacket &faces,
                           LaneBits lanes) {
     if (!scene.data.objects)
@@ -96,6 +140,18 @@ void place_object_surfaces(const PreparedScene &scene, const ObjectHits &hits,
             point.p[k].entry(lane) = one.p[k];
             point.face_normal[k].entry(lane) = one.face_normal[k];
             point.shading_normal[k].entry(lane) = one.shading_normal[k];
+        }
+    });
+}
+
+void place_object_planes(const PreparedScene &scene, const ObjectHits &hits, LaneBits lanes,
+                         SurfacePlane<DoublePacket> &plane) {
+    for_each_lane(lanes, [&](uint32_t lane) {
+        const SurfacePlane<double> one = object_plane(scene, hits.at(lane));
+        for (int k = 0; k < 3; ++k) {
+            plane.p[k].entry(lane) = one.p[k];
+            plane.normal[k].entry(lane) = one.normal[k];
+            plane.error[k].entry(lane) = one.error[k];
         }
     });
 }

@@ -78,8 +78,10 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
         table.inverse_transition = 1.0f / (emitter.cutoff_angle - emitter.beam_width);
     }
     if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
-        table.shadow_rays_from_light =
-            !prepared.bounds.empty() && is_near(prepared.bounds, emitter.position);
+        // Rays from a light would also be rounded in the frames of instances, at both ends.
+        table.shadow_rays_from_light = !prepared.bounds.empty() &&
+                                       is_near(prepared.bounds, emitter.position) &&
+                                       (!scene.objects || scene.objects->instances.empty());
     if (emitter.type != EmitterType::area)
         return table;
 

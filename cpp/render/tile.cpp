@@ -162,6 +162,22 @@ void TileRenderer::shade_hits() {
     }
 }
 
+// For robust shadow rays.
+SurfacePlane<DoublePacket> TileRenderer::plane_of(const HitPacket &hit) const {
+    const LaneBits on_objects = lanes_on_objects(scene_, hit.faces, hit.lanes);
+    const LaneBits on_meshes = hit.lanes & ~on_objects;
+    SurfacePlane<DoublePacket> plane{};
+    if (on_meshes != 0) {
+        const FaceNumbers faces = faces_in(hit.faces, on_meshes);
+        plane = hit_plane<FloatPacket>(scene_, {hit.origin, hit.direction, faces});
+    }
+    if (on_objects != 0)
+        place_object_planes(scene_,
+                            {hit.origin, hit.direction, hit.t, hit.faces, hit.instances},
+                            on_objects, plane);
+    return plane;
+}
+
 void TileRenderer::write_depth_and_normal(const HitPacket &hit,
                                           const SurfacePoint<FloatPacket> &point,
                                           size_t first) {
@@ -206,9 +222,7 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
             return;
         ShadowSegment<FloatPacket> segment;
         if (offset_ == ShadowOffset::robust) {
-            const FaceNumbers faces = faces_in(hit.faces, hit.lanes);
-            segment = robust_segment<FloatPacket>(
-                scene_, {hit.origin, hit.direction, faces}, emitter, light);
+            segment = robust_segment<FloatPacket>(scene_, plane_of(hit), emitter, light);
         } else {
             segment = {offset_point(point.p, point.face_normal, light.target - point.p),
                        light.target};
@@ -245,8 +259,7 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     if (hidden != 0) {
         const Vec3<FloatPacket> start =
             offset_ == ShadowOffset::robust
-                ? robust_passage<FloatPacket>(
-                      scene_, {hit.origin, hit.direction, faces_in(hit.faces, hit.lanes)})
+                ? robust_passage<FloatPacket>(plane_of(hit), hit.direction)
                 : offset_point(point.p, point.face_normal, hit.direction);
         for_each_lane(hidden, [&](uint32_t lane) {
             passing_.ray.push_back(rays[lane]);

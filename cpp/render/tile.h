@@ -12,6 +12,7 @@
 #include "render/sampler.h"
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
+#include "render/shadow_segment.h"
 #include "render/surface.h"
 
 #include <cstdint>
@@ -88,6 +89,7 @@ private:
     void trace_camera_rays(const PixelGroup &group);
     void shade_hits();
     SurfacePoint<FloatPacket> surface_of(const HitPacket &hit, bool common_origin) const;
+    SurfacePlane<DoublePacket> plane_of(const HitPacket &hit) const;
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
