@@ -51,16 +51,21 @@ PLUGINS = {
     ),
 }
 """All plugins of Mitsuba, by the kind of object that they make."""
+HIT_BY_MITSUBA = "where Mitsuba shades, it also finds the hits"
 REMARKS = {
     ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
-    ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
+    ("emitter", "area"): "in constant colours; with textures by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
-    ("shape", "shapegroup"): "shading; of meshes alone it is in the tree",
-    ("shape", "instance"): "shading; of meshes it is written out and in the tree",
+    ("shape", "shapegroup"): "a tree of its own; where Mitsuba shades, see `instance`",
+    ("shape", "instance"): "where Mitsuba shades, of meshes it is written out into the "
+    "tree, and Mitsuba hits others",
+    ("shape", "sphere"): HIT_BY_MITSUBA,
+    ("shape", "disk"): HIT_BY_MITSUBA,
+    ("shape", "cylinder"): HIT_BY_MITSUBA,
     ("shape", "merge"): "shading; its meshes are in the tree",
     ("shape", "blender"): "shading; its mesh is in the tree; not tested, as it takes "
     "addresses in Blender's memory",

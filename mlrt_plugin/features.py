@@ -8,10 +8,8 @@ from .elements import Element
 from .errors import UnsupportedFeature
 from .scene_arrays import Feature
 
-SHAPES = (
-    *("obj", "ply", "serialized", "rectangle", "cube", "mesh"),
-    *("sphere", "disk", "cylinder", "shapegroup", "instance"),
-)
+MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
+SHAPES = (*MESHES, "sphere", "disk", "cylinder", "shapegroup", "instance")
 BSDFS = ("diffuse", "twosided")
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)

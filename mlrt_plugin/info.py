@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import mlrt_llvm
 
 from .errors import SceneError
-from .features import REFUSED, SAMPLERS, native_warnings
+from .features import MESHES, REFUSED, SAMPLERS, native_warnings
 from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
 from .scene_import import SceneSource, SceneSummary, import_scene, summarise
 from .shading_choice import choice_for
@@ -71,7 +71,7 @@ def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) ->
     if not path_is_native:
         if (kind, plugin) in REFUSED:
             return "not supported"
-        return "hits native" if kind == "shape" and is_native else "by Mitsuba"
+        return "hits native" if kind == "shape" and plugin in MESHES else "by Mitsuba"
     if kind == "sampler" and plugin not in SAMPLERS:
         return "replaced"
     return "native" if is_native else "not supported"

@@ -161,13 +161,12 @@ def gather_objects(
 def frame_of(shape: Any, name: str, warnings: list[str]) -> npt.NDArray[np.float64]:
     """(3, 4) matrix from the frame of an analytic shape, in which its size is one."""
     frame = objects.matrix(objects.members(shape)["to_world"])[:3]
-    if not np.isfinite(frame).all():
-        raise SceneError(f"{name} has NaN or infinite parts in its place: repair it")
     sizes = np.linalg.norm(frame[:, :3], axis=0)
-    if abs(np.linalg.det(frame[:, :3])) <= 1e-12 * np.prod(sizes) or not sizes.all():
+    finite = np.isfinite(frame).all()
+    if not finite or abs(np.linalg.det(frame[:, :3])) <= 1e-12 * np.prod(sizes):
         raise SceneError(
-            f"{name} has no extent: its radius, the way from p0 to p1 and the scales of "
-            "its to_world must not be 0"
+            f"{name} has no extent, or no place: its radius, the way from p0 to p1 and the "
+            "scales of its to_world must be finite and must not be 0"
         )
     if objects.plugin_name(shape) == "sphere":
         stretch = np.linalg.svd(frame[:, :3], compute_uv=False)

@@ -46,7 +46,7 @@ def test_approximations_are_named(
 
 
 UNSUPPORTED = {
-    "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
+    "sdfgrid": {"shapes": '<shape type="sdfgrid" id="ball"/>'},
     "constant": {"emitters": '<emitter type="constant" id="sky"/>'},
     "bitmap": {
         "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
