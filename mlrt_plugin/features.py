@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 from .elements import Element
 from .errors import UnsupportedFeature
+from .object_arrays import ANALYTIC_TYPES
 from .scene_arrays import Feature
 
 MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
-SHAPES = (*MESHES, "sphere", "disk", "cylinder", "shapegroup", "instance")
+SHAPES = (*MESHES, *ANALYTIC_TYPES, "shapegroup", "instance")
 BSDFS = ("diffuse", "twosided")
 EMITTERS = ("point", "spot", "directional", "area")
 SENSORS = ("perspective",)
@@ -69,6 +70,8 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
+        return "textures and masks on it are not supported yet"
     if plugin == "instance" and element.properties.get("loaded"):
         return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
@@ -78,6 +81,16 @@ def reason_against(element: Element) -> str:
     ):
         return "only diffuse materials can be nested in it so far"
     return ""
+
+
+def has_varying_parts(shape: Element) -> bool:
+    """Whether something about a shape, or a group of them, varies over its surface."""
+    return any(
+        part.plugin not in CONSTANT_TEXTURES
+        if part.kind == "texture"
+        else part.kind == "bsdf" and part.plugin == "mask"
+        for part in shape.walk()
+    )
 
 
 def refuse_refused(scene: Element, sensor: int) -> None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ._dispatch import core
 from .object_arrays import ObjectArrays
 from .scene_arrays import Shape, Vec3
-from .tree import trace_options
+from .tree import ray_arrays, trace_options
 from .tree_cache import obtain_tree
 
 
@@ -126,3 +126,45 @@ def scene_hits(
     shape = np.where(hit, np.searchsorted(first, number, side="right") - 1, -1)
     own = np.where(hit, number - first[shape], -1)
     return SceneHits(t, shape.astype(np.int32), own.astype(np.int32), instance, u, v)
+
+
+class RayQueries:
+    """Rays against all shapes of a scene, for a class that has its tree and its objects, of
+    the core; objects may be None."""
+
+    tree: Any
+    objects: Any
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """All shapes, by the numbers that `closest_hit` gives."""
+        raise NotImplementedError
+
+    def closest_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> SceneHits:
+        """The nearest hit of each ray on any shape of the scene; arguments are those of
+        `KdTree.closest_hit`."""
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        return scene_hits(self.tree, self.objects, self.shapes, rays, options)
+
+    def any_hit(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike,
+        t_min: npt.ArrayLike = 0.0,
+        t_max: npt.ArrayLike = np.inf,
+        **options: Any,
+    ) -> npt.NDArray[np.bool_]:
+        """Whether any shape of the scene lies on each ray: (N,) bool."""
+        rays = ray_arrays(origins, directions, t_min, t_max)
+        if self.objects is None:
+            found = self.tree.any_hit(*rays, trace_options(options))
+        else:
+            found = self.objects.any_hit(self.tree, *rays, trace_options(options))
+        return np.asarray(found).view(np.bool_)

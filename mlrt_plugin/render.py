@@ -15,7 +15,7 @@ from ._dispatch import core
 from .emitters import check_distances
 from .errors import MlrtError, warn_of
 from .integrators import own_aovs
-from .object_set import SceneHits, add_timings, common_bounds, obtain_objects, scene_hits
+from .object_set import RayQueries, add_timings, common_bounds, obtain_objects
 from .options import (
     AOVS,
     BUILD_OPTIONS,
@@ -28,7 +28,6 @@ from .scene_arrays import Lighting, SceneArrays, Shape, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
 from .threads import thread_count
-from .tree import ray_arrays, trace_options
 from .tree_cache import ObtainedTree, obtain_tree
 from .tree_report import invisible_meshes, tree_report
 
@@ -47,8 +46,9 @@ class RenderResult:
     image: (H, W, 3) float32, linear RGB.
     aovs: by name: depth (H, W) float32, distance from the near plane in scene units, 0 for
     a miss; normal (H, W, 3) float32, shading normal in world space; both are filtered as
-    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss
-    and for shapes that are not in the tree.
+    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss.
+    Natively, faces of shapegroups and then analytic shapes are numbered on from those of
+    the tree; where Mitsuba shades they are -1.
     timings: seconds of load, build and render; with a cache of trees those that
     `ObtainedTree` names in place of build.
     counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays;
@@ -67,7 +67,7 @@ NATIVE = ShadingChoice("native", "arrays of a scene are given")
 
 
 @dataclasses.dataclass(frozen=True)
-class PreparedScene:
+class PreparedScene(RayQueries):
     """A scene with its tree, ready to be rendered any number of times."""
 
     arrays: SceneArrays
@@ -113,35 +113,6 @@ class PreparedScene:
         """What messages call them."""
         others = self.arrays.objects
         return self.arrays.shape_names + (others.shape_names if others is not None else ())
-
-    def closest_hit(
-        self,
-        origins: npt.ArrayLike,
-        directions: npt.ArrayLike,
-        t_min: npt.ArrayLike = 0.0,
-        t_max: npt.ArrayLike = np.inf,
-        **options: Any,
-    ) -> SceneHits:
-        """The nearest hit of each ray on any shape of the scene; arguments are those of
-        `KdTree.closest_hit`."""
-        rays = ray_arrays(origins, directions, t_min, t_max)
-        return scene_hits(self.tree, self.objects, self.shapes, rays, options)
-
-    def any_hit(
-        self,
-        origins: npt.ArrayLike,
-        directions: npt.ArrayLike,
-        t_min: npt.ArrayLike = 0.0,
-        t_max: npt.ArrayLike = np.inf,
-        **options: Any,
-    ) -> npt.NDArray[np.bool_]:
-        """Whether any shape of the scene lies on each ray: (N,) bool."""
-        rays = ray_arrays(origins, directions, t_min, t_max)
-        if self.objects is None:
-            found = self.tree.any_hit(*rays, trace_options(options))
-        else:
-            found = self.objects.any_hit(self.tree, *rays, trace_options(options))
-        return np.asarray(found).view(np.bool_)
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""

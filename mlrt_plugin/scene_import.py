@@ -18,7 +18,6 @@ from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
-from .object_arrays import ObjectArrays
 from .options import integer
 from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
 
@@ -317,7 +316,9 @@ def collect(
         lambda shape: materials.add(shape.bsdf(), name_of(shape)),
         geometry.warnings,
     )
-    shape_of_emitter, emitter_of_shape = lights_of_shapes(by_way, others, sources)
+    shape_of_emitter, emitter_of_shape = scene_objects.lights_of_shapes(
+        by_way, others, sources
+    )
     film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
@@ -353,45 +354,8 @@ def collect(
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
-        objects=with_lights(others, len(shapes), emitter_of_shape),
+        objects=scene_objects.with_lights(others, len(shapes), emitter_of_shape),
     )
-
-
-def lights_of_shapes(
-    by_way: scene_objects.SortedShapes, others: ObjectArrays | None, sources: list[Any]
-) -> tuple[list[int], dict[int, int]]:
-    """The number of the shape that each emitter is on, NONE for none, and the number of the
-    emitter of each shape that glows. Shapes are numbered as the core does: meshes, then
-    those of `others`."""
-    glowing = {}
-    for number, shape in enumerate(by_way.meshes):
-        if shape.emitter() is not None:
-            glowing[number] = shape.emitter()
-    if others is not None:
-        first = len(by_way.meshes) + len(others.shapes) - len(others.analytic_types)
-        for number, shape in enumerate(by_way.analytic):
-            if shape.emitter() is not None:
-                glowing[first + number] = shape.emitter()
-    shape_of_emitter = [NONE] * len(sources)
-    emitter_of_shape = {}
-    for number, own in glowing.items():
-        for index, source in enumerate(sources):
-            if own is source:
-                emitter_of_shape[number], shape_of_emitter[index] = index, number
-    return shape_of_emitter, emitter_of_shape
-
-
-def with_lights(
-    others: ObjectArrays | None, first: int, emitter_of_shape: Mapping[int, int]
-) -> ObjectArrays | None:
-    """Objects whose shapes know their emitters; `first` is the number of the first."""
-    if others is None:
-        return None
-    shapes = tuple(
-        replace(shape, emitter=emitter_of_shape.get(first + number, NONE))
-        for number, shape in enumerate(others.shapes)
-    )
-    return replace(others, shapes=shapes)
 
 
 def rectangle_corners(geometry: meshes.Geometry, shapes: list[Any], number: int) -> Any:

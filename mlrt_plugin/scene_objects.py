@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError
 from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
-from .scene_arrays import Shape
+from .scene_arrays import NONE, Shape
 
 GROUP = "ShapeGroupPlugin"
 """Mitsuba's class of the plugin `shapegroup`."""
@@ -194,3 +194,40 @@ def placements(
             maps[number] = np.array(to_world.matrix)[:3]
             normals[number] = np.array(to_world.inverse_transpose)[:3, :3]
     return maps, normals
+
+
+def lights_of_shapes(
+    by_way: SortedShapes, others: ObjectArrays | None, sources: list[Any]
+) -> tuple[list[int], dict[int, int]]:
+    """The number of the shape that each emitter is on, NONE for none, and the number of the
+    emitter of each shape that glows. Shapes are numbered as the core does: meshes, then
+    those of `others`."""
+    glowing = {}
+    for number, shape in enumerate(by_way.meshes):
+        if shape.emitter() is not None:
+            glowing[number] = shape.emitter()
+    if others is not None:
+        first = len(by_way.meshes) + len(others.shapes) - len(others.analytic_types)
+        for number, shape in enumerate(by_way.analytic):
+            if shape.emitter() is not None:
+                glowing[first + number] = shape.emitter()
+    shape_of_emitter = [NONE] * len(sources)
+    emitter_of_shape = {}
+    for number, own in glowing.items():
+        for index, source in enumerate(sources):
+            if own is source:
+                emitter_of_shape[number], shape_of_emitter[index] = index, number
+    return shape_of_emitter, emitter_of_shape
+
+
+def with_lights(
+    others: ObjectArrays | None, first: int, emitter_of_shape: Mapping[int, int]
+) -> ObjectArrays | None:
+    """Objects whose shapes know their emitters; `first` is the number of the first."""
+    if others is None:
+        return None
+    shapes = tuple(
+        replace(shape, emitter=emitter_of_shape.get(first + number, NONE))
+        for number, shape in enumerate(others.shapes)
+    )
+    return replace(others, shapes=shapes)
