@@ -48,8 +48,9 @@ SurfacePlane<DoublePacket> beside_analytic(const AnalyticShape &shape,
                                            const Vec3<DoublePacket> &targets) {
     SurfacePlane<DoublePacket> points;
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const SurfacePlane<double> one = beside_analytic(
-            shape, Vec3d{targets.x.entry(lane), targets.y.entry(lane), targets.z.entry(lane)});
+        const SurfacePlane<double> one =
+            beside_analytic(shape, Vec3d{targets.x.entry(lane), targets.y.entry(lane),
+                                         targets.z.entry(lane)});
         for (int k = 0; k < 3; ++k) {
             points.p[k].entry(lane) = one.p[k];
             points.normal[k].entry(lane) = one.normal[k];
