@@ -140,6 +140,8 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
         nested = {"bsdf": instance.bsdf(), "emitter": instance.emitter()}
         nested["interior"] = instance.interior_medium()
         nested["exterior"] = instance.exterior_medium()
+        if element.plugin == "instance":
+            element.properties["loaded"] = True
     elif kind == "sensor":
         nested = {"film": instance.film(), "sampler": instance.sampler()}
     elif kind == "film":

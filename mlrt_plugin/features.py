@@ -11,11 +11,12 @@ from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import UnsupportedFeature
 from .materials import DELTA
+from .object_arrays import ANALYTIC_TYPES
 from .scene_arrays import Feature
 from .textures import VARYING
 
 MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
-SHAPES = MESHES
+SHAPES = (*MESHES, *ANALYTIC_TYPES, "shapegroup", "instance")
 BSDFS = ("diffuse", "twosided", "mask", *DELTA)
 EMITTERS = ("point", "spot", "directional", "area", "constant", "envmap")
 SENSORS = ("perspective", "thinlens", "orthographic")
@@ -80,8 +81,10 @@ def reason_against(element: Element) -> str:
         return "textures of lights are not supported yet"
     if kind == "shape" and textures:
         return "textures that are attributes of a shape are not supported yet"
-    if kind == "shape" and plugin not in MESHES and is_textured(element):
-        return "textures are supported on meshes only so far"
+    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
+        return "textures and masks on it are not supported yet"
+    if plugin == "instance" and element.properties.get("loaded"):
+        return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
         return "only arrays of strength 2 are supported so far"
     if plugin == "orthographic" and shears(element.properties.get("to_world")):
@@ -100,9 +103,14 @@ def reason_against(element: Element) -> str:
     return ""
 
 
-def is_textured(element: Element) -> bool:
-    """Whether there are textures in an element that are not the same everywhere."""
-    return any(e.kind == "texture" and e.plugin in VARYING for e in element.walk())
+def has_varying_parts(shape: Element) -> bool:
+    """Whether something about a shape, or a group of them, varies over its surface."""
+    return any(
+        part.plugin not in CONSTANT_TEXTURES
+        if part.kind == "texture"
+        else part.kind == "bsdf" and part.plugin == "mask"
+        for part in shape.walk()
+    )
 
 
 def shears(to_world: Any) -> bool:

@@ -82,6 +82,9 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         flipped.append(bool(shape.has_flipped_normals()))
         vertex_count += len(points)
         face_count += len(corners)
+    if not shapes:
+        vertices = normals = [np.zeros((0, 3), np.float32)]
+        faces = [np.zeros((0, 3), np.uint32)]
     if vertex_count > 0xFFFFFFFF:
         raise SceneError(
             f"the scene has {vertex_count} vertices, more than 2**32: split it"
@@ -94,12 +97,21 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         else np.zeros((0, 3), np.float32),
         first_faces=first_faces,
         first_vertices=first_vertices,
-        face_counts=[len(f) for f in faces],
+        face_counts=[len(f) for f in faces] if shapes else [],
         vertex_normals=interpolated,
         flip_normals=flipped,
         dropped=not_finite,
         warnings=warnings,
     )
+
+
+def rectangle_corners(geometry: Geometry, shapes: list[Any], number: int) -> Any:
+    """(4, 3) vertices of a mesh if it is a rectangle, else None."""
+    if number >= len(shapes) or objects.plugin_name(shapes[number]) != "rectangle":
+        return None
+    first = geometry.first_faces[number]
+    indices = np.unique(geometry.faces[first : first + geometry.face_counts[number]])
+    return geometry.vertices[indices]
 
 
 def has_area(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.uint32]) -> bool:

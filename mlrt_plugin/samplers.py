@@ -67,3 +67,10 @@ def possible_spp(sampler: Sampler, spp: int, pixels: int) -> int:
 def ceiled_root(number: int) -> int:
     """The least whole number whose square is not less."""
     return math.isqrt(number - 1) + 1 if number > 0 else 0
+
+
+def rounded(sampler: str, asked: int, taken: int) -> tuple[str, ...]:
+    """What there is to say of samples per pixel that are not as many as were asked for."""
+    if taken == asked:
+        return ()
+    return (f"sampler '{sampler}' takes {taken} samples a pixel in place of {asked}",)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from .texture_arrays import Texture
+
+if TYPE_CHECKING:
+    from .object_arrays import ObjectArrays
 
 NONE = 0xFFFFFFFF
 """Marks the absence of a material, emitter or shape."""
@@ -186,7 +189,8 @@ class SceneArrays:
     opacity, or NONE. uvs: (V, 2) float32; (0, 2) if no texture needs any.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
-    each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
+    each. shape_names: what messages call the shapes. objects: what is not in these arrays:
+    analytic shapes and instances. not_finite_faces: how many faces of
     each shape had a vertex that is not finite; they are points now.
     sampler: of the sensor.
     environment: (H, W, 3) float32, linear RGB radiance in latitude and longitude, the first
@@ -213,6 +217,7 @@ class SceneArrays:
     uvs: npt.NDArray[np.float32] | None = None
     sampler: Sampler = Sampler()
     environment: npt.NDArray[np.float32] = field(default_factory=no_environment)
+    objects: ObjectArrays | None = None
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):
@@ -221,3 +226,7 @@ class SceneArrays:
             if optional is not None:
                 optional.setflags(write=False)
         self.environment.setflags(write=False)
+
+    def all_shapes(self) -> tuple[Shape, ...]:
+        """Those of the tree and of `objects`, in the order of their faces."""
+        return self.shapes + (self.objects.shapes if self.objects is not None else ())

@@ -63,6 +63,7 @@ class MitsubaWorker:
 def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any:
     """The picture of ``direct`` with one emitter sample; with ``aovs``, that of ``aov``."""
     import mitsuba as mi
+    import object_scenes
     import render_scenes
 
     integrator: dict[str, Any] = {
@@ -74,7 +75,12 @@ def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any
     if "aovs" in options:
         integrator = {"type": "aov", "aovs": options["aovs"]}
     # Merging meshes would make the order of emitters differ from run to run.
-    loaded = mi.load_dict(render_scenes.SCENES[scene](folder), optimize=False)
+    description = (
+        object_scenes.SCENES[scene]()
+        if scene in object_scenes.SCENES
+        else render_scenes.SCENES[scene](folder)
+    )
+    loaded = mi.load_dict(description, optimize=False)
     return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
 
 

@@ -1,6 +1,8 @@
 // The class Scene: arrays and dicts of an imported scene, checked once.
 #include "bind/bind.h"
 #include "bind/fields.h"
+#include "bind/objects_handle.h"
+#include "bind/scene_checks.h"
 #include "bind/scene_handle.h"
 #include "bind/textures.h"
 #include "bind/tree_handle.h"
@@ -92,7 +94,8 @@ Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scen
     shape.flip_normals = fields.boolean("flip_normals", false);
     shape.texture_coordinates = fields.boolean("texture_coordinates", false);
     fields.finish();
-    if (shape.vertex_normals && (scene.faces.empty() || scene.normals.empty()))
+    if (shape.vertex_normals && !is_object(scene, shape) &&
+        (scene.faces.empty() || scene.normals.empty()))
         refuse_value(name + " has vertex normals, but faces or normals are empty.");
     return shape;
 }
@@ -171,81 +174,21 @@ EnvironmentPicture environment_from(const Array<float> &array) {
     return picture;
 }
 
-// Light from all around comes from one emitter at most, and a picture belongs to it.
-void check_environment(const SceneData &scene) {
-    size_t environments = 0, pictures = 0;
-    for (const Emitter &emitter : scene.emitters) {
-        environments += is_environment(emitter.type);
-        pictures += emitter.type == EmitterType::envmap;
-    }
-    if (environments > 1)
-        refuse_value("emitters must have at most one of the types constant and envmap.");
-    if ((pictures > 0) != (scene.environment.width > 0))
-        refuse_value("environment must be given if and only if an emitter is an envmap.");
-}
-
-// Shapes cover the faces in order, and refer to their emitters as these refer to them.
-void check_shapes(const SceneData &scene) {
-    uint64_t next_face = 0;
-    for (size_t i = 0; i < scene.shapes.size(); ++i) {
-        const Shape &shape = scene.shapes[i];
-        const std::string name = numbered("shapes", i);
-        if (shape.first_face != next_face)
-            refuse_value(name + " must begin at face " + std::to_string(next_face) +
-                         ", where the one before it ends.");
-        next_face += shape.face_count;
-        if (next_face > scene.tree->triangles.size())
-            break;
-        if (shape.emitter != NONE &&
-            (scene.emitters[shape.emitter].type != EmitterType::area ||
-             scene.emitters[shape.emitter].shape != i))
-            refuse_value(name +
-                         " glows, but its emitter is not an area light of this shape.");
-    }
-    if (next_face != scene.tree->triangles.size())
-        refuse_value("shapes cover " + std::to_string(next_face) +
-                     " faces, but the tree has " +
-                     std::to_string(scene.tree->triangles.size()) + ".");
-    for (size_t i = 0; i < scene.emitters.size(); ++i) {
-        const Emitter &emitter = scene.emitters[i];
-        if (emitter.type != EmitterType::area)
-            continue;
-        if (scene.shapes[emitter.shape].emitter != i)
-            refuse_value(numbered("emitters", i) + " is not the emitter of its shape.");
-        if (scene.shapes[emitter.shape].face_count == 0)
-            refuse_value(numbered("emitters", i) + " glows on a shape without faces.");
-    }
-}
-
-void check_vertices(const SceneData &scene) {
-    if (!scene.faces.empty() && scene.faces.size() != scene.tree->triangles.size())
-        refuse_value("faces has " + std::to_string(scene.faces.size()) +
-                     " rows, but the tree has " +
-                     std::to_string(scene.tree->triangles.size()) + " triangles.");
-    for (const Shape &shape : scene.shapes) {
-        if (!shape.vertex_normals)
-            continue;
-        for (uint32_t i = shape.first_face; i < shape.first_face + shape.face_count; ++i)
-            for (const uint32_t vertex : scene.faces[i])
-                if (vertex >= scene.normals.size())
-                    refuse_value(numbered("faces", i) + " refers to normal " +
-                                 std::to_string(vertex) + ", but there are " +
-                                 std::to_string(scene.normals.size()) + ".");
-    }
-    for (size_t i = 0; i < scene.normals.size(); ++i)
-        if (!is_finite(scene.normals[i]))
-            refuse_value(numbered("normals", i) + " must be finite.");
-}
-
 SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &normals, const nb::list &shapes,
                        const Array<float> &materials, const nb::list &emitters,
                        const nb::dict &camera, const nb::dict &film, bool hide_emitters,
                        const Array<float> &environment,
                        const std::optional<Array<float>> &uvs, const nb::list &textures,
-                       const std::optional<Array<uint32_t>> &material_textures) {
+                       const std::optional<Array<uint32_t>> &material_textures,
+                       const nb::object &objects) {
     SceneData scene;
     scene.tree = tree.tree;
+    if (!objects.is_none()) {
+        scene.objects = nb::cast<const ObjectsHandle &>(objects).objects;
+        if (scene.objects->first_face != scene.tree->triangles.size())
+            refuse_value("objects must begin at the face after the last of the tree.");
+    }
     scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
     scene.normals = rows<Vec3f>(normals, "normals");
     if (uvs)
@@ -372,6 +315,7 @@ void bind_scene(nb::module_ &m) {
             nb::arg("film"), nb::arg("hide_emitters") = false,
             nb::arg("environment").none() = nb::none(), nb::arg("uvs") = nb::none(),
             nb::arg("textures") = nb::list(), nb::arg("material_textures") = nb::none(),
+            nb::arg("objects") = nb::none(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
             "vertex normals or textures. normals: float32 (V, 3) or (0, 3). shapes, "
             "emitters: lists of "
@@ -382,7 +326,8 @@ void bind_scene(nb::module_ &m) {
             "dicts, fields of the struct in render/texture.h, with the rows of to_uv as "
             "to_u and to_v, and squares as square_0 and square_1. material_textures: "
             "uint32 (M, 3), the texture of front, of back, and of the opacity; 2^32 - 1: "
-            "none. "
+            "none. objects: Objects beside the tree, or None; shapes cover their faces "
+            "too. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

@@ -1,5 +1,6 @@
 // Textures as lists of dicts.
 #include "bind/fields.h"
+#include "bind/scene_checks.h"
 #include "bind/textures.h"
 
 #include <algorithm>
@@ -146,7 +147,10 @@ void check_textures(const SceneData &scene) {
         const std::string name = numbered("shapes", i);
         const Material material =
             shape.material == NONE ? Material{} : scene.materials[shape.material];
-        if ((material.is_textured() || shape.texture_coordinates) && scene.faces.empty())
+        const bool textured = material.is_textured() || shape.texture_coordinates;
+        if (textured && is_object(scene, shape))
+            refuse_value(name + " has textures, but its faces are not in the tree.");
+        if (textured && scene.faces.empty())
             refuse_value(name + " has textures, but faces are empty.");
         for (uint32_t k = 0; k < shape.face_count && shape.texture_coordinates; ++k)
             for (const uint32_t vertex : scene.faces[shape.first_face + k])

@@ -13,7 +13,8 @@ namespace mlrt {
 std::vector<Texture> textures_from(const nanobind::list &dicts);
 
 // Raises ValueError unless each shape with a textured material has what that needs: vertex
-// numbers, texture coordinates if it claims them, and its share of attributes.
+// numbers of faces in the tree, texture coordinates if it claims them, and its share of
+// attributes.
 void check_textures(const SceneData &scene);
 
 } // namespace mlrt

@@ -4,6 +4,7 @@
 
 #include "base/vec.h"
 #include "kdtree/tree.h"
+#include "objects/object_set.h"
 #include "render/texture.h"
 
 #include <array>
@@ -15,7 +16,8 @@ namespace mlrt {
 
 inline constexpr uint32_t NONE = 0xffffffffu;
 
-// A run of faces that share a material and an emitter: one Mitsuba shape.
+// A run of faces that share a material and an emitter: one Mitsuba shape. An analytic shape
+// has one face.
 struct Shape {
     uint32_t first_face = 0;
     uint32_t face_count = 0;
@@ -108,7 +110,9 @@ struct SceneData {
         faces;                  // vertex indices; empty if no shape needs them
     std::vector<Vec3f> normals; // per vertex, unit; empty if no shape needs them
     std::vector<Vec2f> uvs;     // per vertex; empty if no shape needs them
-    std::vector<Shape> shapes;  // ordered by first_face, covering all faces
+    std::vector<Shape> shapes;  // ordered by first_face, covering all faces, those of
+                                // `objects` too
+    std::shared_ptr<const ObjectSet> objects; // what is not in the tree; maybe none
     std::vector<Material> materials;
     std::vector<Texture> textures;
     std::vector<Emitter> emitters;

@@ -23,8 +23,8 @@ from ..render import (
     checked_seed,
     checked_spp,
     chosen_shadow_offset,
-    rounded,
 )
+from ..samplers import rounded
 from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree

@@ -45,7 +45,16 @@ def test_approximations_are_named(
 
 
 UNSUPPORTED = {
-    "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
+    "sphere": {
+        "shapes": '<shape type="sphere" id="ball"><bsdf type="diffuse">'
+        '<texture type="checkerboard" name="reflectance"/></bsdf></shape>'
+    },
+    "shapegroup": {
+        "shapes": '<shape type="shapegroup" id="group"><shape type="cube">'
+        '<bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape></shape>'
+        '<shape type="instance"><ref id="group"/></shape>'
+    },
+    "sdfgrid": {"shapes": '<shape type="sdfgrid" id="ball"/>'},
     "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
     "envmap": {
         "emitters": '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
