@@ -200,6 +200,24 @@ def make_parser() -> Parser:
         metavar="DIR",
         help="MLRT's source checkout (the current one)",
     )
+    readme = commands.add_parser(
+        "readme",
+        help="the results that README.md shows, from the figures that are kept",
+        description="Draws tables and pictures of the results in README.md from the "
+        "figures in compare/results. Nothing is measured.",
+    )
+    readme.set_defaults(run=run_readme, json=None, threads=(1,))
+    readme.add_argument(
+        "--check",
+        action="store_true",
+        help="write nothing; the exit code is 2 if anything is not what the figures say",
+    )
+    readme.add_argument(
+        "--source",
+        type=Path,
+        metavar="DIR",
+        help="MLRT's source checkout (the current one)",
+    )
     return parser
 
 
@@ -251,10 +269,7 @@ def run_hits(options: argparse.Namespace) -> bool:
 def run_kernels(options: argparse.Namespace) -> bool:
     if options.plot is not None:
         check_folder_of(options.plot)
-        if importlib.util.find_spec("matplotlib") is None:
-            raise BenchError(
-                "plots need the package matplotlib: pip install 'mlrt[compare]'"
-            )
+        need_package("matplotlib")
     from .kernels_command import run
 
     return run(options)
@@ -268,6 +283,20 @@ def run_offsets(options: argparse.Namespace) -> bool:
     from .offsets_command import run
 
     return run(options)
+
+
+def run_readme(options: argparse.Namespace) -> bool:
+    need_package("matplotlib")
+    need_package("PIL")
+    from .readme_command import run
+
+    return run(options)
+
+
+def need_package(name: str) -> None:
+    """Raises BenchError unless what plots and pictures need is installed."""
+    if importlib.util.find_spec(name) is None:
+        raise BenchError(f"plots need the package {name}: pip install 'mlrt[compare]'")
 
 
 def run_frames(options: argparse.Namespace) -> bool:
