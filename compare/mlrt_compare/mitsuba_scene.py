@@ -67,6 +67,9 @@ def _loaded(
         )
         mi.parser.transform_all(config, state)
         scene = mi.parser.instantiate(config, state)
+    if settings.resolution is not None:
+        for sensor in scene.sensors():
+            _resize(sensor, settings.resolution)
     default = {
         "type": "direct",
         "emitter_samples": 1,
@@ -96,3 +99,12 @@ def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
         elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
             hide_emitters = bool(node.props["hide_emitters"])
     return hide_emitters
+
+
+def _resize(sensor: Any, size: tuple[int, int]) -> None:
+    """Gives the size to a film that the scene does not declare, and Mitsuba adds."""
+    if tuple(sensor.film().size()) != size:
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = size
+        parameters["film.crop_size"] = size
+        parameters.update()

@@ -45,6 +45,11 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=at_least(0, SEED_LIMIT), default=0, help="random seed (0)"
     )
+    add_choices_of_all(parser)
+
+
+def add_choices_of_all(parser: argparse.ArgumentParser) -> None:
+    """Those of `add_scene_choices` of which there is one for all images of a command."""
     parser.add_argument(
         "-D",
         dest="define",
@@ -87,12 +92,23 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
 
 def settings_of(options: argparse.Namespace, scene: Path, spp: int | None) -> Settings:
     """What the options of `add_scene_choices` ask for."""
+    return settings_with(options, scene, spp, options.seed, options.resolution)
+
+
+def settings_with(
+    options: argparse.Namespace,
+    scene: Path,
+    spp: int | None,
+    seed: int,
+    resolution: tuple[int, int] | None,
+) -> Settings:
+    """What the options of `add_choices_of_all` ask for, with the rest given."""
     return Settings(
         scene=scene,
         spp=spp,
-        seed=options.seed,
+        seed=seed,
         sensor=options.sensor,
-        resolution=options.resolution,
+        resolution=resolution,
         threads=options.threads,
         shading=options.shading,
         folders=tuple(options.append),

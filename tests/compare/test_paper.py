@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import repository
+from mlrt_compare.bench.camera_rays import camera_rays
 from mlrt_compare.bench.frame_runs import FrameRun
 from mlrt_compare.bench.measure import Timing
 from mlrt_compare.bench.scenes import BenchScene, imported
@@ -17,7 +18,7 @@ from mlrt_compare.cli import main
 from mlrt_compare.paper.ablation import ablate_culling, ablate_tree
 from mlrt_compare.paper.counts import counts_of
 from mlrt_compare.paper.frame_times import summary
-from mlrt_compare.paper.grouping import camera_rays, groupings
+from mlrt_compare.paper.grouping import groupings
 from mlrt_compare.paper.published import PUBLISHED, PublishedCounts
 from mlrt_compare.paper.scenes import StudiedScene
 from mlrt_compare.paper.sections import rate

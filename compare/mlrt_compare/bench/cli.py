@@ -119,6 +119,15 @@ def make_parser() -> Parser:
     tiles.set_defaults(run=run_tiles)
     add_shared_options(tiles, repeats=5)
     add_sample_counts(tiles)
+    order = commands.add_parser(
+        "order",
+        help="nanoseconds a ray by the order that rays are given in",
+        description="Traces arrays of rays with MLRT's closest_hit and with Embree: those "
+        "of the camera line by line, in Morton order and shuffled, and rays from what they "
+        "hit in random directions.",
+    )
+    order.set_defaults(run=run_order)
+    add_shared_options(order, repeats=5, scenes="office,conference")
     watertight = commands.add_parser(
         "watertight",
         help="rays at vertices and edges of closed meshes, of which none may escape",
@@ -148,9 +157,9 @@ def make_parser() -> Parser:
         "kernels",
         help="exact tests of triangles beside such in single and double precision",
         description="Traces rays from inside of closed meshes with the same traversal and "
-        "three tests of triangles, as MLRT usually does, and with Embree in its default "
-        "and its robust mode, and counts leaks, other hits than the exact ones and errors "
-        "of t.",
+        "five tests of triangles, in each way that MLRT has, and with Embree in its "
+        "default and its robust mode, and counts leaks, wrong hits, hits of other faces "
+        "and errors of t.",
     )
     kernels.set_defaults(run=run_kernels)
     add_shared_options(kernels, repeats=5)
@@ -170,7 +179,7 @@ def make_parser() -> Parser:
         help="of the meshes, 1 to 10: 8 * 4**N faces (%(default)s)",
     )
     kernels.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw speed against leaks there"
+        "--plot", type=Path, metavar="FILE", help="draw speed against errors there"
     )
     offsets = commands.add_parser(
         "offsets",
@@ -254,6 +263,12 @@ def run_tiles(options: argparse.Namespace) -> bool:
     return run(options)
 
 
+def run_order(options: argparse.Namespace) -> bool:
+    from .order_command import run
+
+    return run(options)
+
+
 def run_watertight(options: argparse.Namespace) -> bool:
     from .watertight_command import run
 
@@ -288,7 +303,7 @@ def run_offsets(options: argparse.Namespace) -> bool:
 def run_readme(options: argparse.Namespace) -> bool:
     need_package("matplotlib")
     need_package("PIL")
-    from .readme_command import run
+    from ..readme.command import run
 
     return run(options)
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from mlrt_plugin.image_files import replacing
 
-from .checkout import find_checkout
-from .errors import BenchError
-from .figures import show
-from .readme import Page, page_of, spliced
+from ..bench.checkout import find_checkout
+from ..bench.errors import BenchError
+from ..bench.figures import show
+from .page import Page, page_of, spliced
 
 
 def run(options: argparse.Namespace) -> bool:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .errors import BenchError
-from .readme_pictures import Pair, Plot
-from .readme_tables import (
+from ..bench.errors import BenchError
+from .pictures import Pair, Plot
+from .tables import (
     frame_lines,
     kernel_lines,
     leak_lines,

@@ -13,9 +13,9 @@ import pytest
 import repository
 from mlrt_compare.bench.checkout import LANDMARKS
 from mlrt_compare.bench.cli import main
-from mlrt_compare.bench.readme import BEGIN, END, RESULTS, page_of, spliced
-from mlrt_compare.bench.readme_pictures import Pair, Plot
-from mlrt_compare.bench.readme_tables import speed_error_lines
+from mlrt_compare.readme.page import BEGIN, END, RESULTS, page_of, spliced
+from mlrt_compare.readme.pictures import Pair, Plot
+from mlrt_compare.readme.tables import speed_error_lines
 from PIL import Image as Pillow
 
 

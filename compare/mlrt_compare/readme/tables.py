@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ..bench.measure import best
+from ..bench.rays_table import work
+from ..bench.speedup import frame_seconds
+from ..bench.table import number, plural
 from ..paper.markdown_tables import table
-from .measure import best
-from .rays_table import work
-from .readme_pictures import name_of
-from .speedup import frame_seconds
-from .table import number, plural
+from .pictures import name_of
 
 Figures = Sequence[dict[str, Any]]
 
