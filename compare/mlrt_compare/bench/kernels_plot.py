@@ -38,7 +38,9 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
     names = list(dict.fromkeys(row["name"] for _, block in blocks for row in block["rows"]))
     colours = mpl.colormaps["tab20"]
     figure = Figure(figsize=(3.6 * len(aims), 9.6), layout="constrained")
-    panels = figure.subplots(len(ERRORS), len(aims), squeeze=False, sharex=True)
+    panels = figure.subplots(
+        len(ERRORS), len(aims), squeeze=False, sharex=True, sharey="row"
+    )
     for row_of_panels, (error, label) in zip(panels, ERRORS.items(), strict=True):
         for axes, aim in zip(row_of_panels, aims, strict=True):
             for mesh, block in blocks:
@@ -50,19 +52,23 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
                     draw_row(axes, row, error, color=colours(place % 20), marker=mark)
             axes.set(xscale="log")
             axes.set_yscale("symlog", linthresh=1)
-            axes.set_ylim(bottom=-0.4)
             axes.grid(True, alpha=0.25)
+        row_of_panels[0].set_ylim(-0.4, max(2 * row_of_panels[0].get_ylim()[1], 10))
         row_of_panels[0].set_ylabel(label)
     for axes, aim in zip(panels[0], aims, strict=True):
         axes.set_title(f"rays at {aim}")
     for axes in panels[-1]:
         axes.set_xlabel(f"Mrays/s, {plural(threads)}")
-    for place, name in enumerate(names):
-        panels[0][0].scatter([], [], color=colours(place % 20), label=name)
-    for mesh, mark in zip(meshes, MARKS, strict=False):
-        panels[0][0].scatter([], [], color="black", marker=mark, label=mesh)
-    handles = panels[0][0].get_legend_handles_labels()
-    figure.legend(*handles, loc="outside lower center", ncols=5, fontsize=9)
+    tests = [
+        axes.scatter([], [], color=colours(place % 20), label=name)
+        for place, name in enumerate(names)
+    ]
+    marks = [
+        axes.scatter([], [], color="black", marker=mark, label=mesh)
+        for mesh, mark in zip(meshes, MARKS, strict=False)
+    ]
+    figure.legend(handles=tests, loc="outside lower center", ncols=5, fontsize=9)
+    figure.legend(handles=marks, loc="outside upper center", ncols=5, fontsize=9)
     figure.savefig(path, dpi=100)
 
 
