@@ -121,7 +121,9 @@ def read_figures(folder: Path) -> dict[str, Any]:
     path = folder / FIGURES
     try:
         figures = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise CannotRun(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise CannotRun(f"{path} cannot be read: {error}") from error
     if not (isinstance(figures, dict) and figures.get("benchmark") == "paper"):
         raise CannotRun(f"{path} was not written by {PROGRAM} paper")

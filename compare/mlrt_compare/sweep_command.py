@@ -44,7 +44,7 @@ def run(arguments: Sequence[str]) -> int:
     executor = locally(options.jobs) if options.dask is None else on_dask(options.dask)
     try:
         found = sweep(jobs, Results(folder / "results"), executor, tell)
-    except (MlrtError, OSError) as error:
+    except MlrtError as error:
         raise CannotRun(str(error)) from error
     write_json(folder / "sweep.json", found)
     text = table(found, options.jobs if options.dask is None else None)

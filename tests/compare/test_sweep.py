@@ -198,6 +198,7 @@ def test_no_scheduler_is_one_sentence(
         ((SCENE, "-j", "0"), "0 is less than 1"),
         ((SCENE, "--resolution", "8x8,9"), "WIDTHxHEIGHT"),
         ((SCENE, "-o", SCENE), "not a folder"),
+        ((SCENE, "-a", "nowhere"), "there is no folder 'nowhere'"),
     ],
 )
 def test_what_cannot_run_is_one_sentence(
