@@ -31,6 +31,7 @@ using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 inline constexpr uint32_t BLOCK_WIDTH = 8;
 using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
 using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
+using IntBlock = drjit::Packet<int32_t, BLOCK_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -175,6 +176,10 @@ MaskOf<T> from_bits(LaneBits bits) {
 #if defined(__AVX512F__)
     if constexpr (std::is_same_v<T, FloatPacket> || std::is_same_v<T, UIntPacket>)
         return MaskOf<T>::from_k(uint16_t(bits));
+    if constexpr (std::is_same_v<T, DoublePacket>) {
+        using Half = std::decay_t<decltype(drjit::low(MaskOf<T>()))>;
+        return MaskOf<T>(Half::from_k(uint8_t(bits)), Half::from_k(uint8_t(bits >> 8)));
+    }
 #endif
     const UIntPacket lane_bit = UIntPacket(1u) << drjit::arange<UIntPacket>();
     return MaskOf<T>((UIntPacket(bits) & lane_bit) != 0u);
@@ -195,6 +200,9 @@ inline uint32_t lane_of(const UIntPacket &packet, uint32_t lane) {
 // 0, 1, 2 ...
 inline FloatPacket lane_numbers() {
     return drjit::arange<FloatPacket>();
+}
+inline UIntPacket lane_indices() {
+    return drjit::arange<UIntPacket>();
 }
 
 // Calls visit(lane) for each set bit, lowest first.
