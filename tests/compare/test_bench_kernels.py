@@ -98,11 +98,14 @@ def test_the_command_tells_and_keeps_it(
     child = command(
         "kernels", "--rays", 2000, "--subdivisions", 2, "--threads", 1, "--repeats", 1,
         "--cache", cache, "--json", file, "--plot", tmp_path / "kernels.png",
+        "--markdown", tmp_path / "kernels.md",
     )  # fmt: skip
     assert child.returncode == 0, child.stderr
     assert "ball, 128 faces, rays at vertices, 1 threads:" in child.stdout
     assert (tmp_path / "kernels.png").read_bytes().startswith(b"\x89PNG")
     figures = json.loads(file.read_text())
+    page = (tmp_path / "kernels.md").read_text()
+    assert page.count("\n## ") == 16 and page.count("\n| beams |") == 4
     assert [scene["name"] for scene in figures["scenes"]] == [
         "ball",
         "slivers",

@@ -179,6 +179,9 @@ def make_parser() -> Parser:
         help="of the meshes, 1 to 10: 8 * 4**N faces (%(default)s)",
     )
     kernels.add_argument(
+        "--markdown", type=Path, metavar="FILE", help="write all tables there"
+    )
+    kernels.add_argument(
         "--plot", type=Path, metavar="FILE", help="draw speed against errors there"
     )
     offsets = commands.add_parser(
@@ -282,6 +285,8 @@ def run_hits(options: argparse.Namespace) -> bool:
 
 
 def run_kernels(options: argparse.Namespace) -> bool:
+    if options.markdown is not None:
+        check_folder_of(options.markdown)
     if options.plot is not None:
         check_folder_of(options.plot)
         need_package("matplotlib")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from mlrt_plugin.image_files import replacing
 from mlrt_plugin.threads import thread_count
 
 from .checkout import find_checkout
@@ -19,10 +20,11 @@ from .kernels import (
     rays_inside,
 )
 from .machine import machine_record
+from .markdown import table
 from .native import load_native
 from .options import default_cache
 from .status import show_status
-from .table import aligned
+from .table import aligned, machine_lines, plural
 
 SEED = 20261128
 
@@ -65,6 +67,9 @@ def run(options: argparse.Namespace) -> bool:
                     title = f"{mesh.name}, {len(mesh.faces)} faces, rays at {aim}"
                     show(["", f"{title}, {threads} threads:", *lines(rows)])
         write_json(options.json, figures)
+    if options.markdown is not None:
+        with replacing(options.markdown) as temporary:
+            temporary.write_text(markdown(figures), encoding="utf-8")
     if options.plot is not None:
         from .kernels_plot import write_plot
 
@@ -72,25 +77,44 @@ def run(options: argparse.Namespace) -> bool:
     return wrong == 0
 
 
+HEAD = (
+    *("test", "rays", "leaks", "wrong hits", "other hits"),
+    *("t inexact", "ulps p99", "max", "Mrays/s"),
+)
+
+
 def lines(rows: list[dict[str, Any]]) -> list[str]:
-    table: list[tuple[str, ...]] = [
-        (
-            *("test", "rays", "leaks", "wrong hits", "other hits"),
-            *("t inexact", "ulps p99", "max", "Mrays/s"),
-        )
+    return aligned([HEAD, *map(cells, rows)])
+
+
+def cells(row: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        row["name"],
+        f"{row['rays']:,}",
+        f"{row['leaks']:,}",
+        f"{row['wrong_hits']:,}",
+        f"{row['other_hits']:,}",
+        f"{row['inexact_t']:,}",
+        f"{row['ulps_p99']:.0f}",
+        f"{row['ulps_max']:,}",
+        f"{row['rays_per_second'] / 1e6:.2f}",
+    )
+
+
+def markdown(figures: dict[str, Any]) -> str:
+    """All rows as a page."""
+    page = [
+        "# Tests of triangles and ways through the tree",
+        "",
+        "By `mlrt-bench kernels`: leaks are rays that find nothing, wrong hits such of "
+        "what lies behind, other hits those of another face than the exact one, most of "
+        "which tie; then distances that are not the nearest float, and by how many units "
+        "in the last place.",
+        "",
+        *machine_lines(figures["machine"]),
     ]
-    for row in rows:
-        table.append(
-            (
-                row["name"],
-                f"{row['rays']:,}",
-                f"{row['leaks']:,}",
-                f"{row['wrong_hits']:,}",
-                f"{row['other_hits']:,}",
-                f"{row['inexact_t']:,}",
-                f"{row['ulps_p99']:.0f}",
-                f"{row['ulps_max']:,}",
-                f"{row['rays_per_second'] / 1e6:.2f}",
-            )
-        )
-    return aligned(table)
+    for scene in figures["scenes"]:
+        for block in scene["blocks"]:
+            title = f"{scene['name']}, rays at {block['aim']}, {plural(block['threads'])}"
+            page += ["", f"## {title}", "", *table(HEAD, map(cells, block["rows"]))]
+    return "\n".join(page) + "\n"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ..bench.markdown import table
 from ..bench.measure import best
 from ..bench.rays_table import work
 from ..bench.speedup import frame_seconds
 from ..bench.table import number, plural
-from ..paper.markdown_tables import table
 from .pictures import name_of
 
 Figures = Sequence[dict[str, Any]]
