@@ -118,7 +118,7 @@ def test_speed_and_error_are_told_with_what_speaks_against_them() -> None:
     cold = next(line for line in lines if line.startswith("| living-room | 0.250"))
     assert cold == "| living-room | 0.250 | - | 5.00 | 0.250 | - | 5.00 | never |"
     assert "- living-room: a bias shows" in lines
-    assert "- living-room: times of MLRT 1 at 4 spp are not to be published" in lines
+    assert "- living-room: times that are not to be published, of MLRT 1 at 4 spp" in lines
 
 
 def test_a_plot_is_stale_when_a_figure_in_it_changed(tmp_path: Path) -> None:

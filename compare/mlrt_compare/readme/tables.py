@@ -158,10 +158,9 @@ def speed_error_lines(all_figures: Figures) -> list[str]:
         starts = [cold_start(side) for side in (ours, theirs)]
         cold.append([name, *starts[0], *starts[1], break_even(figures)])
         failed += [f"{name}: {reason}" for reason in figures["reasons"]]
-        failed += [
-            f"{name}: times of {which} are not to be published"
-            for which in figures["disturbed"]
-        ]
+        if figures["disturbed"]:
+            which = ", ".join(figures["disturbed"])
+            failed.append(f"{name}: times that are not to be published, of {which}")
     threads = dict.fromkeys(plural(figures["threads"]) for figures in all_figures)
     lines = [
         "`mlrt-compare speed-error`: how many times less MSE MLRT has at equal time, and "
