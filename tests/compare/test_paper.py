@@ -301,7 +301,7 @@ def test_camera_rays_hit_what_the_image_shows(studied: StudiedScene) -> None:
 
 
 def test_groupings_are_of_pixels_each_once() -> None:
-    orders = groupings(64, 16, 1)
+    orders = groupings(64, 16, 1, triangles=800)
     neighbours, within, random = orders.values()
     assert np.array_equal(np.sort(neighbours), np.arange(64 * 64))
     for order in (within, random):
@@ -316,6 +316,15 @@ def test_groupings_are_of_pixels_each_once() -> None:
     assert np.ptp(rows) == np.ptp(columns) == 3
     rows, columns = np.divmod(within[:16], 64)
     assert np.ptp(rows) > 3 and np.ptp(columns) > 3
+
+
+def test_random_groups_are_smaller_in_large_scenes() -> None:
+    def sizes(triangles: int) -> list[int]:
+        return [len(order) for order in groupings(256, 32, 1, triangles).values()]
+
+    assert sizes(282_238) == [256**2, 2**14, 2**11]
+    assert sizes(2_200_000) == [256**2, 3 * 32**2, 480]
+    assert sizes(7_200_000) == [256**2, 32**2, 256]
 
 
 def test_random_groups_cost_more_and_hit_the_same(run: Path) -> None:

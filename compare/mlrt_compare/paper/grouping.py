@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from ..bench.camera_rays import Rays, camera_rays, morton_order
 from ..bench.status import show_status
-from .counts import counts_of
+from .counts import PACKET_RAYS, counts_of
 from .scenes import StudiedScene
 from .ways import PACKET, PACKET_WITHOUT, PAPER, WITHOUT
 
@@ -21,8 +21,11 @@ BEFORE_THE_HIT = 1 - 2.0**-10
 """Where shadow rays end, of their length, so that they do not meet what was hit; chosen."""
 SEED = 1
 TILE_RAYS, RANDOM_RAYS = 2**14, 2**11
-"""Traced in random order within tiles, and from anywhere; chosen. One interval for rays
-that go apart visits most of the tree, so that few must do."""
+"""Traced at most in random order within tiles, and from anywhere; chosen. One interval for
+rays that go apart visits most of the tree, so that few must do."""
+TILE_WORK, RANDOM_WORK, LEAST_RAYS = 2**33, 2**30, 2**8
+"""Rays times triangles of these groups, where that is not fewer than the least; chosen, so
+that millions of triangles take seconds."""
 
 
 def shadow_rays(
@@ -37,21 +40,27 @@ def shadow_rays(
     return Rays(light, directions, np.zeros_like(t_max), t_max)
 
 
-def groupings(side: int, tile: int, seed: int) -> dict[str, npt.NDArray[np.int64]]:
+def groupings(
+    side: int, tile: int, seed: int, triangles: int
+) -> dict[str, npt.NDArray[np.int64]]:
     """Orders of pixels of a square film, by name: all of them with neighbours together, in
     Morton order; tiles that are chosen at random, the rays of each in random order; and
     rays that are chosen at random.
 
-    tile: rays along the side of a tile.
+    tile: rays along the side of a tile. triangles: of the scene; the more, the fewer rays
+    in random groups.
     """
     random = np.random.default_rng(seed)
     neighbours = morton_order(side)
     tiles = neighbours[: len(neighbours) // tile**2 * tile**2].reshape(-1, tile**2)
-    chosen = random.permutation(tiles)[: max(TILE_RAYS // tile**2, 1)]
+    of_tiles = min(TILE_RAYS, TILE_WORK // triangles)
+    anywhere = min(RANDOM_RAYS, max(RANDOM_WORK // triangles, LEAST_RAYS))
+    anywhere -= anywhere % PACKET_RAYS
+    chosen = random.permutation(tiles)[: max(of_tiles // tile**2, 1)]
     return {
         "neighbours": neighbours,
         "random within tiles": random.permuted(chosen, axis=1).ravel(),
-        "random": random.permutation(neighbours)[:RANDOM_RAYS],
+        "random": random.permutation(neighbours)[:anywhere],
     }
 
 
@@ -69,7 +78,8 @@ def compare_groupings(studied: StudiedScene) -> dict[str, Any]:
     same = True
     result: dict[str, Any] = {}
     tile = min(int(PAPER.options["minimum_tile"]), studied.side)
-    for name, order in groupings(studied.side, tile, SEED).items():
+    triangles = len(studied.scene.faces)
+    for name, order in groupings(studied.side, tile, SEED, triangles).items():
         result[name] = {"rays": len(order), "ways": {}}
         for way in WAYS:
             show_status(f"{studied.scene.name}: {name}, {way.name}")
