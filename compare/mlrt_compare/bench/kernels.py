@@ -212,6 +212,8 @@ def far_off(
 ) -> npt.NDArray[np.bool_]:
     """Which rays hit something else than is there: the distance tells, as faces tie at
     vertices and edges."""
-    error = np.abs(t.astype(np.float64) - exact_t)
-    result: npt.NDArray[np.bool_] = (face >= 0) & ~(error <= FAR * exact_t)
-    return result
+    far = np.zeros(len(t), bool)
+    hit = face >= 0
+    distance = exact_t[hit].astype(np.float64)
+    far[hit] = ~(np.abs(t[hit] - distance) <= FAR * distance)
+    return far
