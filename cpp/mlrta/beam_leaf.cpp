@@ -162,21 +162,20 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             const float first = size * unit.first - TINY_PARAMETER;
             const float last = size * unit.last + TINY_PARAMETER;
             const bool enter_near = !(last < depths.near);
-            const bool enter_far = !(first > depths.far) && !(first > tests_.far_end());
+            const bool enter_far = !(first > minimum(tests_.far_end(), depths.far));
             if (enter_near | enter_far) {
                 // Without branches, as nobody foresees where a beam goes. What waits is
-                // written even if it does not wait.
-                const float far_near = first > depths.near ? first : depths.near;
+                // written even if it does not wait, and where only the far side is entered
+                // that begins no later than the cell.
                 const bool to_lower = enter_near != above;
                 stack[pending] = {node.lower_child() + 1 - above,
-                                  {far_near, depths.far},
+                                  {maximum(first, depths.near), depths.far},
                                   changed,
                                   axis + 3 * above,
                                   distance};
                 pending += uint32_t(enter_near & enter_far);
                 node_index = node.lower_child() + !to_lower;
-                depths = {enter_near ? depths.near : far_near,
-                          enter_near && last < depths.far ? last : depths.far};
+                depths.far = enter_near ? minimum(last, depths.far) : depths.far;
                 change(axis + 3 * to_lower, distance);
                 continue;
             }
