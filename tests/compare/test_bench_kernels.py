@@ -129,3 +129,6 @@ def test_what_the_native_side_refuses(native: Native) -> None:
     with pytest.raises(ValueError, match="the same length"):
         tree.trace_with("exact", rays, rays[:3], t, face)
     assert_one_sentence(command("kernels", "--rays", "0"), "0 is not from 1 to")
+    assert_one_sentence(command("kernels", "--plot", "x.txt"), "x.txt must be one of .png")
+    child = command("kernels", "--markdown", "none/x.md")
+    assert_one_sentence(child, "there is no folder none")

@@ -21,6 +21,7 @@ from .options import (
     add_study_options,
     check_folder_of,
     check_json,
+    check_plot,
     check_threads,
     count,
     names,
@@ -288,7 +289,7 @@ def run_kernels(options: argparse.Namespace) -> bool:
     if options.markdown is not None:
         check_folder_of(options.markdown)
     if options.plot is not None:
-        check_folder_of(options.plot)
+        check_plot(options.plot)
         need_package("matplotlib")
     from .kernels_command import run
 
