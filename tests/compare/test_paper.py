@@ -289,6 +289,14 @@ def test_smaller_tiles_take_more_search_and_leave_less_to_packets(
     assert small["steps"] - small["entry_steps"] <= large["steps"] - large["entry_steps"]
 
 
+def test_tiles_of_large_scenes_are_counted_without_shadow_rays(
+    studied: StudiedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlrt_compare.paper.tile_sweep.SHADOWED_TRIANGLES", 10)
+    (row,) = sweep_tiles(studied, Tiles((32,), (32,)), 1)
+    assert row["primary"]["steps"] > 0 and "primary_and_shadow" not in row
+
+
 def test_camera_rays_hit_what_the_image_shows(studied: StudiedScene) -> None:
     """Those of the control are the renderer's, through the centres of pixels: only where
     an edge passes through a pixel may its jittered ray meet another face."""
