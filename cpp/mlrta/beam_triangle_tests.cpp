@@ -136,7 +136,7 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
     const auto possible = (highest >= packet.least) & (smallest >= -edge_error);
     const auto certain = smallest > edge_error;
     const auto nearer =
-        possible & certain & (lowest > packet.greatest) & (highest < packet.nearest);
+        possible & certain & (lowest > packet.greatest) & (highest < beam_.nearest);
     const LaneBits found = to_bits(nearer);
     packet.found |= found;
     if constexpr (query == Query::any) {
