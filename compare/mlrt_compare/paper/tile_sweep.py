@@ -15,7 +15,6 @@ from .frame_times import time_in_turns
 from .scenes import StudiedScene
 from .ways import PAPER_SEARCH
 
-
 SHADOWED_TRIANGLES = 2**22
 """Above that shadow rays are left out: one interval for rays that go apart takes many
 seconds a frame then; chosen."""
