@@ -31,8 +31,8 @@ PAIRS = ("office", "living-room")
 """Scenes of which pictures may be shown, by the names of their files in `pictures`."""
 CREDITS = {
     "living-room": '"The Grey & White Room" by Wig42, in the Mitsuba version of Benedikt '
-    "Bitterli ([CC BY 3.0](https://creativecommons.org/licenses/by/3.0/)), here with diffuse "
-    "surfaces and one point light",
+    "Bitterli ([CC BY 3.0](https://creativecommons.org/licenses/by/3.0/)), here with "
+    "diffuse surfaces and one point light",
 }
 INTRODUCTION = (
     "Ratios of times are above 1 where MLRT is faster; rows where it is slower somewhere "
