@@ -37,6 +37,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted", file=sys.stderr)
         return INTERRUPTED
+    except OSError as error:
+        if os.environ.get("MLRT_DEBUG"):
+            raise
+        named = error.filename is not None and error.strerror is not None
+        message = f"{error.filename}: {error.strerror}" if named else str(error)
+        print(f"{PROGRAM}: {message}", file=sys.stderr)
+        return COULD_NOT_RUN
     except Exception as error:
         if os.environ.get("MLRT_DEBUG"):
             raise
