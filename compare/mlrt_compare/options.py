@@ -182,9 +182,15 @@ def check_json(path: Path | None) -> None:
 
 def write_json(path: Path | None, figures: Any) -> None:
     """Writes figures, all of them or no file; a number that is not finite becomes null."""
+    if path is not None:
+        text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False)
+        write_text(path, text + "\n")
+
+
+def write_text(path: Path | None, text: str) -> None:
+    """Writes a text, all of it or no file."""
     if path is None:
         return
-    text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False) + "\n"
     temporary = path.with_name(f".{path.name}.unfinished")
     try:
         temporary.write_text(text)

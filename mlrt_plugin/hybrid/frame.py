@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
 from .. import mitsuba_objects as objects
-from .direct_light import DirectLight, PrimaryHits
+from .direct_light import PrimaryHits
 from .samplers import IndependentStream, Pass, mitsubas_sampler, passes
 
 AOV_CHANNELS = {"depth": 1, "normal": 3}
 """Numbers a pixel of those AOVs that are filtered as colours are."""
+
+
+class Light(Protocol):
+    """What computes the radiance along rays, see `DirectLight`."""
+
+    def radiance(self, ray: Any, sampler: Any) -> tuple[Any, PrimaryHits]: ...
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,7 @@ class Frame:
 def render_frame(
     module: Any,
     sensor: Any,
-    light: DirectLight,
+    light: Light,
     *,
     spp: int,
     seed: int,

@@ -42,6 +42,25 @@ def test_reference_is_rendered_once_and_kept(tmp_path: Path) -> None:
     assert run(SCENE, *SMALL, "--cache", cache) == 0
 
 
+def test_each_path_of_a_folder(tmp_path: Path) -> None:
+    """With a table; what is no scene is told of and not counted."""
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    (folder / "box.xml").write_text(SCENE.read_text())
+    (folder / "part.xml").write_text('<scene version="3.0.0"/>')
+    table, figures = tmp_path / "z.md", tmp_path / "z.json"
+    options = (*SMALL, "--cache", tmp_path / "cache", "--each-path")
+    assert run(folder, *options, "--table", table, "--json", figures) == 0
+    rows = json.loads(figures.read_text())
+    assert [row.get("path") for row in rows] == ["native", "mitsuba", None]
+    # Both take the same samples, so that one reference does for both.
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert all(row["pixels_pass"] for row in rows[:2])
+    text = table.read_text()
+    assert text.count("| pass |") == 2 and "- part.xml: scene" in text
+    assert run(folder / "part.xml", *options) == 4
+
+
 def test_stored_reference_of_mitsubas_tests_goes_before(
     tmp_path: Path, scalar_variant: None
 ) -> None:
