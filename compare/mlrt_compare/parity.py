@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from mlrt_plugin.hybrid.frame import FilmArea, render_frame
 from mlrt_plugin.hybrid.prepared import PreparedHybrid
+from mlrt_plugin.hybrid.samplers import MOST_SUMMANDS
 from mlrt_plugin.parsing import resolving_from
 from mlrt_plugin.render import prepare
 
@@ -20,6 +21,7 @@ from .adjudication import Judgement, adjudicate, decided_by_rounding
 from .metrics import differing_mask
 from .mitsuba_renderer import MitsubaRenderer
 from .mlrt_renderer import MlrtRenderer
+from .options import CannotRun
 from .settings import Settings
 from .timing import interleave
 from .twin_hits import Findings, TwinLight
@@ -75,9 +77,12 @@ class Parity:
 def parity(settings: Settings) -> Parity:
     """Renders a scene by MLRT, by Mitsuba, and by the twin that tells which rays differ.
 
-    `settings.shading` chooses the path. Raises MlrtError if it cannot be rendered.
+    `settings.shading` chooses the path. Raises MlrtError if it cannot be rendered,
+    and CannotRun for too many samples.
     """
     ours = MlrtRenderer(settings)
+    if ours.spp > MOST_SUMMANDS:
+        raise CannotRun(f"rays are told apart up to {MOST_SUMMANDS} spp, not {ours.spp}")
     theirs = MitsubaRenderer(settings, ours.integrator, ours.by_mitsuba)
     first, mitsuba_first = ours.frame(), theirs.frame()
     frames, mitsuba_frames = interleave(ours.frame, theirs.frame, ROUNDS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,10 +24,12 @@ from .options import (
     write_json,
     write_text,
 )
-from .scene_files import scenes_in, short_names
+from .scene_files import common_folder, scenes_in, short_names, told_from
 from .settings import Settings
 
 PATHS = ("native", "mitsuba")
+PLACE = re.compile(r"( with id '[^']*')? at \S+ line [\d:]+")
+"""Of an element in a message; the table says the scene already."""
 Row = dict[str, Any]
 
 
@@ -42,6 +45,7 @@ def run(arguments: Sequence[str]) -> int:
     from .machine import machine_of_comparison
     from .parity import parity
 
+    base = common_folder(scenes)
     rows: list[Row] = []
     code = PASSED
     for scene, name in zip(scenes, short_names(scenes), strict=True):
@@ -53,6 +57,7 @@ def run(arguments: Sequence[str]) -> int:
             except Exception as error:
                 # A crash of one scene is a finding, and the others are still of interest.
                 row |= {"code": COULD_NOT_RUN, "error": " ".join(str(error).split())}
+            row = told_from(row, base)
             if any(
                 old["name"] == name and old.get("error") == row.get("error", "")
                 for old in rows
@@ -62,8 +67,9 @@ def run(arguments: Sequence[str]) -> int:
             tell(row)
             if row["code"] != COULD_NOT_RUN or scene in options.scenes:
                 code = max(code, row["code"])
-            figures = {"command": list(arguments), "machine": machine_of_comparison()}
-            write_json(options.json, {**figures, "scenes": rows})
+            options_told = [w for w in arguments if Path(w) not in options.scenes]
+            figures = {"options": options_told, "machine": machine_of_comparison()}
+            write_json(options.json, told_from({**figures, "scenes": rows}, base))
             write_text(options.table, table(rows))
     return code
 
@@ -120,7 +126,7 @@ def table(rows: Sequence[Row]) -> str:
         judged = row["judgement"]
         verdicts = ("both_right", "only_ours", "only_theirs", "not_judged")
         # What `auto` takes has a reason; the other path has been asked for.
-        reason = because if row["path"] == path else "asked for"
+        reason = PLACE.sub("", because) if row["path"] == path else "asked for"
         seconds = [row[key] for key in ("load", "build", "first", "steady")]
         theirs = [row[key] for key in ("mitsuba_first", "mitsuba_steady")]
         lines.append(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from .options import CannotRun
 
@@ -23,8 +24,20 @@ def scenes_in(paths: Sequence[Path]) -> list[Path]:
 
 def short_names(scenes: Sequence[Path]) -> list[str]:
     """Names of scenes in a table: their paths from the folder that holds all."""
-    paths = [scene.absolute() for scene in scenes]
-    if len(paths) == 1:
-        return [paths[0].name]
-    base = os.path.commonpath([str(path.parent) for path in paths])
-    return [path.relative_to(base).as_posix() for path in paths]
+    base = common_folder(scenes)
+    return [scene.absolute().relative_to(base).as_posix() for scene in scenes]
+
+
+def common_folder(scenes: Sequence[Path]) -> Path:
+    """The folder that holds all, itself or in others."""
+    return Path(os.path.commonpath([str(scene.absolute().parent) for scene in scenes]))
+
+
+def told_from(figures: Any, folder: Path) -> Any:
+    """The same, with the paths in texts told from a folder: of a dictionary or a list those
+    in it."""
+    if isinstance(figures, dict):
+        return {key: told_from(value, folder) for key, value in figures.items()}
+    if isinstance(figures, list | tuple):
+        return [told_from(value, folder) for value in figures]
+    return figures.replace(f"{folder}{os.sep}", "") if isinstance(figures, str) else figures

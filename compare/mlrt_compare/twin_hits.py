@@ -31,7 +31,8 @@ class Rays:
 
     kind: CLOSEST or SHADOW. origins, directions: (N, 3) float32; ends: (N,) float32.
     answers: (N,) int64: of a closest hit the face among all of the scene, -1 for a miss,
-    -2 - n for shape n that is no mesh; of a shadow ray 1 if it is blocked, else 0.
+    below that for a shape that is no mesh, the same for one shape; of a shadow ray 1 if it
+    is blocked, else 0.
     """
 
     kind: str
@@ -59,7 +60,8 @@ class Recorded:
 
     def closest_hit(self, ray: Any, active: Any) -> tuple[Any, Any]:
         pi, face = self._hits.closest_hit(ray, active)
-        shape = np.array(pi.shape_index).astype(np.int64)
+        # Not its index, as there may be several scenes that shapes are in.
+        shape = np.array(dr.reinterpret_array(dr.uint32_array_t(face), pi.shape), np.int64)
         answers = np.array(face).astype(np.int64)
         found = np.array(pi.is_valid()) & (answers < 0)
         answers[found] = -2 - shape[found]

@@ -28,7 +28,7 @@ from .options import (
     write_json,
     write_text,
 )
-from .scene_files import scenes_in, short_names
+from .scene_files import common_folder, scenes_in, told_from
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -108,6 +108,7 @@ def run(arguments: Sequence[str]) -> int:
         judged = judge_scenes(options)
     elif len(images) == len(options.inputs) == 3:
         judged = [judge_images(options)]
+        write_json(options.json, [one.as_dict() for one in judged])
     else:
         raise CannotRun(
             "name scenes, or three EXR files: the image, the reference and the variance of "
@@ -115,7 +116,6 @@ def run(arguments: Sequence[str]) -> int:
         )
     if options.output is not None:
         write_p_maps(judged, options.output)
-    write_json(options.json, [one.as_dict() for one in judged])
     return max(
         (one.code for one in judged if one.test or Path(one.name) in options.inputs),
         default=COULD_NOT_RUN,
@@ -154,8 +154,9 @@ def judge_scenes(options: argparse.Namespace) -> list[Judged]:
         except (MlrtError, CannotRun) as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
             found.append(Judged(str(scene), error=str(error)))
-        write_json(options.json, [one.as_dict() for one in found])
-        write_text(options.table, table(found))
+        rows = told_from([one.as_dict() for one in found], common_folder(scenes))
+        write_json(options.json, rows)
+        write_text(options.table, table(rows))
     return found
 
 
@@ -235,26 +236,26 @@ def named(integrator: dict[str, Any]) -> str:
     return " + ".join([str(integrator["type"]), *counts]).replace(" + ", " ", 1)
 
 
-def table(judged: Sequence[Judged]) -> str:
-    """All tests as Markdown."""
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """All tests as Markdown, of the figures of each."""
     lines = [
-        "| scene | path | samples | asks for more | spp | reference "
+        "| scene | path | samples | asks for more | spp | reference, spp "
         "| pixels' channels that pass (%) | smallest p | p of the mean | seconds | |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     skipped = []
-    names = short_names([Path(one.name) for one in judged])
-    for one, name in zip(judged, names, strict=True):
-        test, reference = one.test, one.reference
-        if test is None or reference is None:
-            skipped.append(f"- {name}: {one.error}")
+    for row in rows:
+        if "error" in row:
+            skipped.append(f"- {row['name']}: {row['error']}")
             continue
-        known = f", {reference.spp:.0f} spp" if math.isfinite(reference.spp) else ""
+        known = row["reference_spp"]
         lines.append(
-            f"| {name} | {one.path} | {one.integrator} | {one.asks_for_more or 'no'} "
-            f"| {test.spp} | {reference.source}{known} | {100 * test.passing:.4f} "
-            f"| {test.smallest_p:.2g} | {test.mean_p:.2g} | {one.seconds:.2g} "
-            f"| {'pass' if test.pixels_pass else 'FAIL'} |"
+            f"| {row['name']} | {row['path']} | {row['integrator']} "
+            f"| {row.get('asks_for_more', 'no')} | {row['spp']} "
+            f"| {row['reference']}{f', {known:.0f}' if math.isfinite(known) else ''} "
+            f"| {100 * row['passing_share']:.4f} | {row['smallest_p']:.2g} "
+            f"| {row['mean_p']:.2g} | {row['seconds']:.2g} "
+            f"| {'pass' if row['pixels_pass'] else 'FAIL'} |"
         )
     if skipped:
         lines += ["", "Not judged:", "", *skipped]

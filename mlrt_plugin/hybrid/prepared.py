@@ -22,6 +22,7 @@ from ..render import (
     checked_seed,
     checked_spp,
     chosen_shadow_offset,
+    own_spp,
 )
 from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
@@ -139,7 +140,8 @@ class PreparedHybrid:
             )
         lighting, loaded, sensor = self.lighting, self.loaded, self.loaded.sensor
         sampler = sensor.sampler()
-        asked = checked_spp(self.spp if spp is None else spp)
+        name = loaded.sampler_name
+        asked = own_spp(self.spp, name) if spp is None else checked_spp(spp)
         samples = possible_spp(sampler, asked)
         depth = lighting.integrator == "depth"
         light = self.light(self.hits(**options))

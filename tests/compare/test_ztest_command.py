@@ -16,6 +16,8 @@ from mlrt_compare.scalar_reference import stored_reference
 from mlrt_compare.scene_hash import scene_hash
 from mlrt_compare.settings import Settings
 
+import mlrt_llvm
+
 SCENE = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
 SMALL = ("--resolution", "24x24", "--spp", "64", "--reference-spp", "512")
 SEED = 20_260_810
@@ -44,6 +46,10 @@ def test_reference_is_rendered_once_and_kept(tmp_path: Path) -> None:
 
 def test_each_path_of_a_folder(tmp_path: Path) -> None:
     """With a table; what is no scene is told of and not counted."""
+    try:
+        mlrt_llvm.activate()
+    except mlrt_llvm.LlvmUnavailable as error:
+        pytest.skip(f"Mitsuba's llvm_ad_rgb: {error}")
     folder = tmp_path / "scenes"
     folder.mkdir()
     (folder / "box.xml").write_text(SCENE.read_text())
@@ -161,7 +167,7 @@ def test_one_that_cannot_be_tested_does_not_stop_the_others(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "SCENE|IMAGE"),
+        ((), "SCENE|FOLDER|IMAGE"),
         (("a.exr", "b.exr"), "three EXR files"),
         (("a.exr", "b.exr", "c.exr"), "--spp N"),
         (("a.exr", "b.exr", "c.exr", "--spp", "1"), "a.exr does not exist"),
