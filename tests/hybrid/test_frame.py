@@ -205,7 +205,7 @@ def test_moments_are_those_of_mitsuba(assets: Path, inner: str) -> None:
     native = assets / "native.xml"
     native.write_text(parts.SCENES["native"])
     with pytest.raises(MlrtError, match="choose shading = mitsuba"):
-        render(native, shading="native", aovs=("moment",))
+        prepare(native, shading="native").render(aovs=("moment",))
 
 
 def test_mitsubas_scene_has_the_lights_and_the_bounds_only(assets: Path) -> None:
