@@ -31,6 +31,7 @@ using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 inline constexpr uint32_t BLOCK_WIDTH = 8;
 using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
 using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
+using IntBlock = drjit::Packet<int32_t, BLOCK_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -175,6 +176,10 @@ MaskOf<T> from_bits(LaneBits bits) {
 #if defined(__AVX512F__)
     if constexpr (std::is_same_v<T, FloatPacket> || std::is_same_v<T, UIntPacket>)
         return MaskOf<T>::from_k(uint16_t(bits));
+    if constexpr (std::is_same_v<T, DoublePacket>) {
+        using Half = std::decay_t<decltype(drjit::low(MaskOf<T>()))>;
+        return MaskOf<T>(Half::from_k(uint8_t(bits)), Half::from_k(uint8_t(bits >> 8)));
+    }
 #endif
     const UIntPacket lane_bit = UIntPacket(1u) << drjit::arange<UIntPacket>();
     return MaskOf<T>((UIntPacket(bits) & lane_bit) != 0u);
@@ -195,6 +200,9 @@ inline uint32_t lane_of(const UIntPacket &packet, uint32_t lane) {
 // 0, 1, 2 ...
 inline FloatPacket lane_numbers() {
     return drjit::arange<FloatPacket>();
+}
+inline UIntPacket lane_indices() {
+    return drjit::arange<UIntPacket>();
 }
 
 // Calls visit(lane) for each set bit, lowest first.
@@ -255,6 +263,62 @@ LaneArray<Value> to_lanes(const Packet &packet) {
     LaneArray<Value> lanes;
     drjit::store_aligned(lanes.data(), packet);
     return lanes;
+}
+
+// Sixteen packets, and a value of each.
+using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
+
+namespace simd_detail {
+
+#if defined(__AVX512F__)
+// `better` keeps one of two values a lane. Halves the number of packets and of the values
+// that are left of each, four times.
+template <typename Better>
+FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
+    FloatPacket two[8], four[4];
+    for (int i = 0; i < 8; ++i) {
+        const __m512 a = rows[size_t(2 * i)].m, b = rows[size_t(2 * i + 1)].m;
+        two[i] = better(FloatPacket(_mm512_unpacklo_ps(a, b)),
+                        FloatPacket(_mm512_unpackhi_ps(a, b)));
+    }
+    for (int i = 0; i < 4; ++i) {
+        const __m512d a = _mm512_castps_pd(two[2 * i].m);
+        const __m512d b = _mm512_castps_pd(two[2 * i + 1].m);
+        four[i] = better(FloatPacket(_mm512_castpd_ps(_mm512_unpacklo_pd(a, b))),
+                         FloatPacket(_mm512_castpd_ps(_mm512_unpackhi_pd(a, b))));
+    }
+    const auto halved = [&](const FloatPacket &a, const FloatPacket &b) {
+        return better(FloatPacket(_mm512_shuffle_f32x4(a.m, b.m, 0x88)),
+                      FloatPacket(_mm512_shuffle_f32x4(a.m, b.m, 0xdd)));
+    };
+    return halved(halved(four[0], four[1]), halved(four[2], four[3]));
+}
+#endif
+
+} // namespace simd_detail
+
+// Lane i of the result is the least lane of packet i. Lanes must be ordered (no NaN).
+inline FloatPacket least_lanes(const PacketRows &rows) {
+#if defined(__AVX512F__)
+    return simd_detail::best_lanes(rows, minimum<FloatPacket>);
+#else
+    LaneArray<float> least;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
+        least[i] = least_lane(rows[i]);
+    return load<FloatPacket>(least);
+#endif
+}
+
+// The same of the greatest lanes.
+inline FloatPacket greatest_lanes(const PacketRows &rows) {
+#if defined(__AVX512F__)
+    return simd_detail::best_lanes(rows, maximum<FloatPacket>);
+#else
+    LaneArray<float> greatest;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
+        greatest[i] = greatest_lane(rows[i]);
+    return load<FloatPacket>(greatest);
+#endif
 }
 
 // Writes the lanes whose bit is set one after the other, and something else behind them:

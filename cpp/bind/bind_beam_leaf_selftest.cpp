@@ -116,7 +116,12 @@ nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
 bool grid_may_hit(const BeamUnderTest &self, float p, float q, float half_p, float half_q) {
     RayGrid grid;
     grid.fill(self.beam);
-    return grid.may_hit(p, q, half_p, half_q);
+    TriangleForms forms{};
+    forms.box_p[0] = p;
+    forms.box_q[0] = q;
+    forms.box_half_p[0] = half_p;
+    forms.box_half_q[0] = half_q;
+    return grid.may_hit(forms, 1) != 0;
 }
 
 // Rays in the order of their cells, and for each whether it lies beyond the best cut.

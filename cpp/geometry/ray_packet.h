@@ -49,11 +49,13 @@ struct PacketCandidates {
 };
 
 // The volumes U, V, W of triangle_test.h in single precision, and a bound on their error
-// that holds for all active lanes. They only filter: what they leave open is decided
-// exactly, so they may be evaluated in any way that keeps the bound.
+// that holds for all active lanes: of sixteen rays and a triangle, or of a ray and eight
+// triangles. They only filter: what they leave open is decided exactly, so they may be
+// evaluated in any way that keeps the bound.
+template <typename Real>
 struct FilteredVolumes {
-    FloatPacket u, v, w;
-    FloatPacket error;
+    Real u, v, w;
+    Real error;
 
     // Edge normals belong to the triangle and the origin: three dot products a lane remain.
     FilteredVolumes(const RayPacket<CommonOrigin> &rays, const Triangle &triangle) {
@@ -65,7 +67,7 @@ struct FilteredVolumes {
         // Rounding the normal to float, the product and two sums: four in a row, 5 with the
         // rounding of the bound. The normal's own error in double adds as in
         // triangle_test.cpp.
-        const auto edge = [&](const Vec3d &p, const Vec3d &q, FloatPacket &volume) {
+        const auto edge = [&](const Vec3d &p, const Vec3d &q, Real &volume) {
             const Vec3d normal = cross(p, q);
             if (!(max_component(abs(normal)) < LARGEST_NORMAL))
                 return double(INFINITY);
@@ -85,29 +87,28 @@ struct FilteredVolumes {
 
     // Differences, products, subtraction, product and sums: seven roundings in a row, each
     // of the six terms of a volume at most |d|_1 times the square of the largest component.
-    FilteredVolumes(const RayPacket<LaneOrigins> &rays, const Triangle &triangle) {
-        const auto relative = [&](const Vec3f &p) -> Vec3<FloatPacket> {
-            return {p.x - rays.origin.point.x, p.y - rays.origin.point.y,
-                    p.z - rays.origin.point.z};
-        };
-        const auto largest = [](const Vec3<FloatPacket> &p) {
+    FilteredVolumes(const Vec3<Real> &origin, const Vec3<Real> &direction,
+                    const Vec3<Real> &vertex_a, const Vec3<Real> &vertex_b,
+                    const Vec3<Real> &vertex_c) {
+        const auto largest = [](const Vec3<Real> &p) {
             return maximum(absolute(p.x), maximum(absolute(p.y), absolute(p.z)));
         };
-        const Vec3<FloatPacket> a = relative(triangle.a);
-        const Vec3<FloatPacket> b = relative(triangle.b);
-        const Vec3<FloatPacket> c = relative(triangle.c);
-        u = dot(rays.direction, cross(b, c));
-        v = dot(rays.direction, cross(c, a));
-        w = dot(rays.direction, cross(a, b));
-        const FloatPacket size = maximum(largest(a), maximum(largest(b), largest(c)));
-        const FloatPacket direction_sum = absolute(rays.direction.x) +
-                                          absolute(rays.direction.y) +
-                                          absolute(rays.direction.z);
+        const Vec3<Real> a = vertex_a - origin, b = vertex_b - origin,
+                         c = vertex_c - origin;
+        u = dot(direction, cross(b, c));
+        v = dot(direction, cross(c, a));
+        w = dot(direction, cross(a, b));
+        const Real size = maximum(largest(a), maximum(largest(b), largest(c)));
+        const Real direction_sum =
+            absolute(direction.x) + absolute(direction.y) + absolute(direction.z);
         error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) +
                 UNDERFLOW * direction_sum + SMALLEST_BOUND;
-        error = select(MaskOf<FloatPacket>((size < LARGEST_SIZE) & (error < LARGEST_BOUND)),
-                       error, FloatPacket(INFINITY));
+        error = select(MaskOf<Real>((size < LARGEST_SIZE) & (error < LARGEST_BOUND)), error,
+                       Real(INFINITY));
     }
+    FilteredVolumes(const RayPacket<LaneOrigins> &rays, const Triangle &triangle)
+        : FilteredVolumes(rays.origin.point, rays.direction, in_all_lanes(triangle.a),
+                          in_all_lanes(triangle.b), in_all_lanes(triangle.c)) {}
 
     // Lanes that certainly hit, and lanes that neither certainly hit nor certainly miss.
     // Comparisons with NaN are false, so what overflowed stays undecided.
@@ -130,8 +131,8 @@ private:
     static constexpr double LARGEST_NORMAL = 0x1p120;
     static constexpr float LARGEST_SIZE = 0x1p60f;
 
-    FloatPacket least() const { return minimum(u, minimum(v, w)); }
-    FloatPacket greatest() const { return maximum(u, maximum(v, w)); }
+    Real least() const { return minimum(u, minimum(v, w)); }
+    Real greatest() const { return maximum(u, maximum(v, w)); }
 };
 
 template <typename Origin>
@@ -153,7 +154,7 @@ template <typename Origin>
 PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
                            const Triangle &triangle) {
     PacketCandidates result;
-    const FilteredVolumes volumes(rays, triangle);
+    const FilteredVolumes<FloatPacket> volumes(rays, triangle);
     const LaneBits misses = volumes.certain_misses();
     if ((lanes & ~misses) == 0)
         return result;

@@ -64,6 +64,16 @@ struct TrianglePlane {
         normal = cross(ab, ac);
         magnitude = cross_magnitude(ab, ac);
     }
+
+    // n.d, and what bounds its error once it is multiplied by the greatest absolute
+    // component of the direction.
+    template <typename Real>
+    Real denominator(const Vec3<Real> &direction) const {
+        return (normal.x * direction.x + normal.y * direction.y) + normal.z * direction.z;
+    }
+    double denominator_error() const {
+        return (10 * DOUBLE_ROUNDOFF) * ((magnitude.x + magnitude.y) + magnitude.z);
+    }
 };
 
 // Numerator n.(a - o) of the distance, with a bound on its error.
@@ -95,25 +105,25 @@ struct PlaneDistance {
     Real t;
     Real error; // NaN or infinite if nothing is known
 
-    template <typename Numerator>
-    PlaneDistance(const TrianglePlane &plane, const PlaneNumerator<Numerator> &numerator,
-                  const Vec3<Real> &direction, const Real &max_direction) {
-        const Real denominator =
-            (plane.normal.x * direction.x + plane.normal.y * direction.y) +
-            plane.normal.z * direction.z;
-        const double magnitude =
-            (10 * DOUBLE_ROUNDOFF) *
-            ((plane.magnitude.x + plane.magnitude.y) + plane.magnitude.z);
-        const Real denominator_error = magnitude * max_direction;
+    // By numerator and denominator and bounds on their errors.
+    PlaneDistance(const Real &numerator, const Real &numerator_error,
+                  const Real &denominator, const Real &denominator_error) {
         const Real reciprocal = 1.0 / denominator;
-        t = numerator.value * reciprocal;
+        t = numerator * reciprocal;
         const Real absolute_t = absolute(t);
-        error = 2.0 * ((numerator.error + absolute_t * denominator_error) *
+        error = 2.0 * ((numerator_error + absolute_t * denominator_error) *
                        absolute(reciprocal)) +
                 (4 * DOUBLE_ROUNDOFF) * absolute_t;
         error = select(MaskOf<Real>(denominator_error <= 0.5 * absolute(denominator)),
                        error, Real(std::numeric_limits<double>::infinity()));
     }
+
+    template <typename Numerator>
+    PlaneDistance(const TrianglePlane &plane, const PlaneNumerator<Numerator> &numerator,
+                  const Vec3<Real> &direction, const Real &max_direction)
+        : PlaneDistance(Real(numerator.value), Real(numerator.error),
+                        plane.denominator(direction),
+                        plane.denominator_error() * max_direction) {}
 
     // The float nearest to t, where `certain`: both ends of the range of t round to it.
     template <typename Single>

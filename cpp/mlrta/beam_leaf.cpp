@@ -154,7 +154,7 @@ bool BeamWalk<query>::walk(const Entry &entry) {
         if (!node.is_leaf()) {
             const uint32_t axis = uint32_t(node.axis());
             const float distance = node.split() - beam_.origin[int(axis)];
-            const uint32_t above = distance < 0;
+            const bool above = distance < 0;
             const CrossingDepths unit = crossing_[axis][above];
             const float size = std::abs(distance);
             // Not a number if the origin lies in the plane: comparisons are written so
@@ -162,23 +162,21 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             const float first = size * unit.first - TINY_PARAMETER;
             const float last = size * unit.last + TINY_PARAMETER;
             const bool enter_near = !(last < depths.near);
-            const bool enter_far = !(first > depths.far) && !(first > tests_.far_end());
-            const uint32_t far_child = node.lower_child() + 1 - above;
-            const uint32_t far_bound = above ? axis + 3 : axis;
-            const float far_near = first > depths.near ? first : depths.near;
-            if (enter_near) {
-                if (enter_far)
-                    stack[pending++] = {
-                        far_child, {far_near, depths.far}, changed, far_bound, distance};
-                node_index = node.lower_child() + above;
-                depths.far = last < depths.far ? last : depths.far;
-                change(above ? axis : axis + 3, distance);
-                continue;
-            }
-            if (enter_far) {
-                node_index = far_child;
-                depths.near = far_near;
-                change(far_bound, distance);
+            const bool enter_far = !(first > minimum(tests_.far_end(), depths.far));
+            if (enter_near | enter_far) {
+                // Without branches, as nobody foresees where a beam goes. What waits is
+                // written even if it does not wait, and where only the far side is entered
+                // that begins no later than the cell.
+                const bool to_lower = enter_near != above;
+                stack[pending] = {node.lower_child() + 1 - above,
+                                  {maximum(first, depths.near), depths.far},
+                                  changed,
+                                  axis + 3 * above,
+                                  distance};
+                pending += uint32_t(enter_near & enter_far);
+                node_index = node.lower_child() + !to_lower;
+                depths.far = enter_near ? minimum(last, depths.far) : depths.far;
+                change(axis + 3 * to_lower, distance);
                 continue;
             }
         } else if (node.reference_count() > 0 && !beside()) {
@@ -209,8 +207,9 @@ bool BeamWalk<query>::walk(const Entry &entry) {
 
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     uint32_t most_triangles, BeamPackets &beam, Counters &counters) {
-    BeamTriangleTests<query> tests(tree, rays, most_triangles, beam, counters);
+                     HitDistances &distances, uint32_t most_triangles, BeamPackets &beam,
+                     Counters &counters) {
+    BeamTriangleTests<query> tests(tree, rays, distances, most_triangles, beam, counters);
     BeamWalk<query> walk(tree, beam, tests, counters);
     for (uint32_t i = 0; i < frontier.count; ++i)
         if (!walk.walk(frontier.entries[i]))
@@ -219,10 +218,10 @@ bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &f
 }
 
 template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
-                                              const Frontier &, uint32_t, BeamPackets &,
-                                              Counters &);
+                                              const Frontier &, HitDistances &, uint32_t,
+                                              BeamPackets &, Counters &);
 template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
-                                          const Frontier &, uint32_t, BeamPackets &,
-                                          Counters &);
+                                          const Frontier &, HitDistances &, uint32_t,
+                                          BeamPackets &, Counters &);
 
 } // namespace mlrt

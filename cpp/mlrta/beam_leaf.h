@@ -9,6 +9,7 @@
 #include "base/counters.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/frontier.h"
+#include "mlrta/hit_distances.h"
 
 namespace mlrt {
 
@@ -19,6 +20,7 @@ namespace mlrt {
 // what has been found till then is true of Query::any, and of no use otherwise.
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     uint32_t most_triangles, BeamPackets &beam, Counters &counters);
+                     HitDistances &distances, uint32_t most_triangles, BeamPackets &beam,
+                     Counters &counters);
 
 } // namespace mlrt

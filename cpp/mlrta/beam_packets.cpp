@@ -29,6 +29,9 @@ constexpr float LEAST_SLACK = 0x1p-120f;
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
 constexpr float SMALLEST_DEPTH = 0x1p-120f;
 
+// Ends of rays below it: what is lost to underflow is small beside what is above.
+constexpr float SMALLEST_END = 0x1p-60f;
+
 // Distances below it may be denormal once they are rounded, and then equal where depths
 // differ: of none of them it is certain which one is nearer.
 constexpr float SMALLEST_DISTANCE = 0x1p-125f;
@@ -56,8 +59,8 @@ bool BeamPackets::choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray
     return false;
 }
 
-void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
-                              BeamPacket &packet) const {
+FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                                     BeamPacket &packet) const {
     const uint32_t first = packet.first_ray;
     const auto [i, j, k] = axes;
     const FloatPacket di = load_padded(rays.direction[i], first, last);
@@ -87,18 +90,20 @@ void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
         packet.strays =
             finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
 
+    // One division for both bounds. What is rounded to a small t_max may exceed it by more
+    // than that share, and small depths may have lost digits: nothing is certain of them.
     const FloatPacket end = t_max * main;
-    const FloatPacket before_end =
-        maximum(end * (1 - WIDEN_DEPTH) - SMALLEST_DEPTH, FloatPacket(0.0f));
-    // What is rounded to a denormal t_max may exceed it by more than that share.
-    const FloatPacket beyond_end =
-        (t_max + SMALLEST_FLOAT) * main * (1 + WIDEN_DEPTH) + SMALLEST_DEPTH;
-    packet.least = masked(packet.active, 1.0f / beyond_end, INFINITE);
-    packet.greatest = 1.0f / before_end;
-    const FloatPacket begin =
-        maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
-        SMALLEST_DEPTH;
-    packet.nearest = (1 - WIDEN_DEPTH) / greatest_lane(masked(packet.active, begin, 0.0f));
+    const FloatPacket at_end = 1.0f / end;
+    const auto moderate = (t_max >= SMALLEST_END) & (end >= SMALLEST_END);
+    packet.least =
+        masked(packet.active,
+               select(moderate, at_end * (1 - WIDEN_DEPTH), FloatPacket(0.0f)), INFINITE);
+    packet.greatest = select(moderate, at_end * (1 + WIDEN_DEPTH), FloatPacket(INFINITE));
+    return masked(packet.active,
+                  maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
+                          (1 + WIDEN_DEPTH) +
+                      SMALLEST_DEPTH,
+                  0.0f);
 }
 
 // The image of the film's x axis in slopes, at the first packet.
@@ -154,17 +159,22 @@ void BeamPackets::turn_as_rays() {
 void BeamPackets::fit_rectangle() {
     const float c = rectangle.cosine, s = rectangle.sine;
     const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
-    LaneArray<float> lo_p, hi_p, lo_q, hi_q;
-    lo_p.fill(INFINITE);
-    lo_q.fill(INFINITE);
-    hi_p.fill(-INFINITE);
-    hi_q.fill(-INFINITE);
-    least.fill(INFINITE);
+    // Packets that are missing, and lanes that are not active, bound nothing.
+    const FloatPacket none_lo(INFINITE), none_hi(-INFINITE);
+    PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
+    const auto leave_out = [&](uint32_t n) {
+        lo_p[n] = lo_q[n] = least_of[n] = none_lo;
+        hi_p[n] = hi_q[n] = none_hi;
+    };
+    for (uint32_t n = count; n < CAPACITY; ++n)
+        leave_out(n);
     FloatPacket lo_u = INFINITE, hi_u = -INFINITE, lo_v = INFINITE, hi_v = -INFINITE;
     for (uint32_t n = 0; n < count; ++n) {
         const BeamPacket &packet = packets[n];
-        if (packet.active == 0)
+        if (packet.active == 0) {
+            leave_out(n);
             continue;
+        }
         const auto active = from_bits<FloatPacket>(packet.active);
         // Inactive lanes repeat the first ray of all.
         const FloatPacket u = select(active, packet.u, first_u);
@@ -176,12 +186,13 @@ void BeamPackets::fit_rectangle() {
         const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
         const FloatPacket p = fused(du, FloatPacket(c), dv * s);
         const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
-        lo_p[n] = least_lane(select(active, p, FloatPacket(INFINITE)));
-        hi_p[n] = greatest_lane(select(active, p, FloatPacket(-INFINITE)));
-        lo_q[n] = least_lane(select(active, q, FloatPacket(INFINITE)));
-        hi_q[n] = greatest_lane(select(active, q, FloatPacket(-INFINITE)));
-        least[n] = least_lane(packet.least);
+        lo_p[n] = select(active, p, none_lo);
+        hi_p[n] = select(active, p, none_hi);
+        lo_q[n] = select(active, q, none_lo);
+        hi_q[n] = select(active, q, none_hi);
+        least_of[n] = packet.least;
     }
+    store(least.data(), least_lanes(least_of));
     slope_lo[0] = least_lane(lo_u);
     slope_hi[0] = greatest_lane(hi_u);
     slope_lo[1] = least_lane(lo_v);
@@ -189,10 +200,8 @@ void BeamPackets::fit_rectangle() {
     const float size_u = std::max(std::abs(slope_lo[0]), std::abs(slope_hi[0]));
     const float size_v = std::max(std::abs(slope_lo[1]), std::abs(slope_hi[1]));
 
-    const FloatPacket p0 = mlrt::load<FloatPacket>(lo_p),
-                      p1 = mlrt::load<FloatPacket>(hi_p);
-    const FloatPacket q0 = mlrt::load<FloatPacket>(lo_q),
-                      q1 = mlrt::load<FloatPacket>(hi_q);
+    const FloatPacket p0 = least_lanes(lo_p), p1 = greatest_lanes(hi_p);
+    const FloatPacket q0 = least_lanes(lo_q), q1 = greatest_lanes(hi_q);
     const float beam_p0 = least_lane(p0), beam_p1 = greatest_lane(p1);
     const float beam_q0 = least_lane(q0), beam_q1 = greatest_lane(q1);
     const float mid_p = 0.5f * (beam_p0 + beam_p1), mid_q = 0.5f * (beam_q0 + beam_q1);
@@ -223,10 +232,11 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
         return;
     const BeamPacket *first_active = nullptr;
+    FloatPacket begin = 0.0f;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
         BeamPacket &packet = packets[count++];
         packet.first_ray = i;
-        load_packet(rays, first + ray_count, packet);
+        begin = maximum(load_packet(rays, first + ray_count, packet), begin);
         if (packet.active != 0 && !first_active)
             first_active = &packet;
         any_stray |= packet.strays != 0;
@@ -234,6 +244,7 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     if (!first_active)
         return;
     any_active = true;
+    nearest = (1 - WIDEN_DEPTH) / greatest_lane(begin);
     const uint32_t lane = uint32_t(__builtin_ctz(first_active->active));
     rectangle = {};
     rectangle.center_u = to_lanes<float>(first_active->u)[lane];

@@ -36,7 +36,6 @@ struct BeamPacket {
     FloatPacket u, v;
     FloatPacket least, greatest; // bounds of 1 / z of the best hit
     UIntPacket primitive;        // of the best hit
-    float nearest;               // reciprocal depths below it lie behind every t_min
     uint32_t first_ray;          // of the group
     LaneBits active, found;
 
@@ -55,6 +54,7 @@ struct BeamPackets {
     uint32_t count; // of packets
     std::array<BeamPacket, CAPACITY> packets;
     bool any_active, any_stray;
+    float nearest; // reciprocal depths below it lie behind every t_min
 
     SlopeRectangle rectangle; // holds the slopes of all active rays
     float slope_lo[2], slope_hi[2];
@@ -83,7 +83,8 @@ struct BeamPackets {
 
 private:
     bool choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count);
-    void load_packet(const RayGroup &rays, uint32_t last, BeamPacket &packet) const;
+    // Returns the depths at which rays begin, or zero where they are not active.
+    FloatPacket load_packet(const RayGroup &rays, uint32_t last, BeamPacket &packet) const;
     void turn_as_film(const CameraMap &camera);
     void turn_as_rays();
     void fit_rectangle();

@@ -11,8 +11,9 @@
 
 namespace mlrt {
 
-// What neighbouring beams took so far, from which the next ones profit.
-struct BeamExperience {
+// What the beams of a group leave to the next ones.
+struct BeamMemory {
+    HitDistances distances;
     float triangles_per_ray = 0; // tested against the beam; a moving average
 };
 
@@ -26,9 +27,9 @@ public:
     // `camera` has made the rays, if it is given.
     BeamTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
                const CameraMap *camera, Output output, Counters &counters,
-               BeamExperience &experience)
+               BeamMemory &memory)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
-          counters_(counters), experience_(experience),
+          counters_(counters), memory_(memory),
           packets_(tree, rays, options, output, counters) {}
 
     // Traces a run of rays.
@@ -67,10 +68,10 @@ private:
                                   : std::numeric_limits<uint32_t>::max();
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
-        const bool done =
-            trace_beam_leaf<Output::query>(tree_, rays_, frontier, most, beam, counters_);
+        const bool done = trace_beam_leaf<Output::query>(
+            tree_, rays_, frontier, memory_.distances, most, beam, counters_);
         const float spent = float(counters_.beam_triangles - before) / float(active);
-        experience_.triangles_per_ray += 0.5f * (spent - experience_.triangles_per_ray);
+        memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)
                 cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
@@ -92,7 +93,8 @@ private:
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
                 output_.set(packet.first_ray, packet.found,
-                            hit_distances(tree_, rays_, packet, counters_),
+                            memory_.distances.of(rays_, packet.first_ray, packet.found,
+                                                 packet.primitive, counters_),
                             packet.primitive);
             else
                 output_.set(packet.first_ray, packet.found, packet.primitive);
@@ -131,8 +133,8 @@ private:
             return false;
         const Occupancy occupancy(beam_);
         const std::optional<Occupancy::Cut> cut = occupancy.best_cut(
-            experience_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
-                                                                     : USUAL_SHARE);
+            memory_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
+                                                                 : USUAL_SHARE);
         if (!cut && (ordered || !occupancy.is_disordered(beam_)))
             return false;
         std::array<uint8_t, BeamPackets::MAX_RAYS> order;
@@ -152,7 +154,7 @@ private:
         typename Output::Buffer buffer;
         Output output = output_.into(buffer);
         output.clear(part.count);
-        BeamTracer(tree_, group, options_, nullptr, output, counters_, experience_)
+        BeamTracer(tree_, group, options_, nullptr, output, counters_, memory_)
             .trace_beam(0, part.count, frontier, ordered);
         output_.set(part, buffer);
         part.add_cost_to(rays_);
@@ -179,7 +181,7 @@ private:
     const CameraMap *camera_;
     Output output_;
     Counters &counters_;
-    BeamExperience &experience_;
+    BeamMemory &memory_;
     PacketTracer<CommonOrigin, Output> packets_;
     BeamPackets beam_;
 };

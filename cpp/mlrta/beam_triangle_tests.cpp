@@ -72,166 +72,157 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         grid_.fill(beam_);
         dense_ = true;
     }
-    for_each_lane(forms.possible, [&](uint32_t lane) {
-        if (dense_ && !grid_.may_hit(forms.box_p[lane], forms.box_q[lane],
-                                     forms.box_half_p[lane], forms.box_half_q[lane]))
-            return;
-        test_triangle(forms, lane, numbers[lane]);
+    // All pairs first, so that the loop over them, which is the inner one, is long and its
+    // end easy to foresee.
+    uint32_t pairs = 0;
+    const LaneBits possible =
+        dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
+    for_each_lane(possible, [&](uint32_t lane) {
+        const LaneBits packets = touched_packets(forms, lane);
+        store_compressed(pairs_.data() + pairs,
+                         lane_indices() + UIntPacket(lane * PACKET_WIDTH), packets);
+        pairs += uint32_t(std::popcount(packets));
     });
-    for_each_lane(forms.unsafe, [&](uint32_t lane) {
-        for (uint32_t n = 0; n < beam_.count; ++n)
-            test_unsafe(beam_.packets[n], numbers[lane]);
-    });
+    counters_.triangle_tests += pairs;
+    LaneBits changed = 0;
+    for (uint32_t i = 0; i < pairs; ++i) {
+        const uint32_t n = pairs_[i] % PACKET_WIDTH, lane = pairs_[i] / PACKET_WIDTH;
+        changed |= LaneBits(test_packet(beam_.packets[n], forms, lane, numbers[lane])) << n;
+    }
+    if (changed != 0)
+        update_least(changed);
+    for_each_lane(forms.unsafe, [&](uint32_t lane) { test_unsafe(numbers[lane]); });
 }
 
-// Packets that the triangle may touch, sixteen at a time, then their rays.
+// One triangle against all packets: those in which a ray may hit it, and nearer than what
+// the ray has found.
 template <Query query>
-void BeamTriangleTests<query>::test_triangle(const TriangleForms &forms, uint32_t lane,
-                                             uint32_t primitive) {
-    const auto beside = (absolute(beam_.center_p - forms.box_p[lane]) >
-                         beam_.half_p + forms.box_half_p[lane]) |
-                        (absolute(beam_.center_q - forms.box_q[lane]) >
-                         beam_.half_q + forms.box_half_q[lane]);
-    LaneBits packets = ((1u << beam_.count) - 1) & ~to_bits(beside);
-    if (packets == 0)
-        return;
-    const FloatPacket edge_error(forms.edge_error[lane]);
-    MaskOf<FloatPacket> touched, covered;
-    FloatPacket smallest, greatest;
-    for (int form = 0; form < 4; ++form) {
+LaneBits BeamTriangleTests<query>::touched_packets(const TriangleForms &forms,
+                                                   uint32_t lane) const {
+    auto touched = (absolute(beam_.center_p - forms.box_p[lane]) <=
+                    beam_.half_p + forms.box_half_p[lane]) &
+                   (absolute(beam_.center_q - forms.box_q[lane]) <=
+                    beam_.half_q + forms.box_half_q[lane]);
+    const auto greatest = [&](int form) {
         const FloatPacket of_p(forms.of_p[form][lane]), of_q(forms.of_q[form][lane]);
         const FloatPacket middle =
             fused(of_p, beam_.center_p,
                   fused(of_q, beam_.center_q, FloatPacket(forms.center[form][lane])));
-        const FloatPacket extent =
-            fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
-        if (form == TriangleForms::DEPTH) {
-            greatest = middle + extent;
-        } else if (form == 0) {
-            smallest = middle - extent;
-            greatest = middle + extent;
-        } else {
-            smallest = minimum(smallest, middle - extent);
-            greatest = minimum(greatest, middle + extent);
-        }
-        if (form == 2) {
-            touched = greatest >= -edge_error;
-            covered = smallest > edge_error;
-        }
-    }
-    const FloatPacket highest = fused(greatest, FloatPacket(forms.depth_grow[lane]),
-                                      FloatPacket(forms.depth_error[lane]));
-    packets &= to_bits(touched & (highest >= load<FloatPacket>(beam_.least)));
-    const LaneBits covered_packets = to_bits(covered);
-    bool changed = false;
-    for_each_lane(packets, [&](uint32_t n) {
-        changed |= test_packet(beam_.packets[n], forms, lane, primitive,
-                               (covered_packets >> n & 1) != 0);
-    });
-    if (changed)
-        update_least();
+        return middle + fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
+    };
+    const FloatPacket edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
+    const FloatPacket highest =
+        fused(greatest(TriangleForms::DEPTH), FloatPacket(forms.depth_grow[lane]),
+              FloatPacket(forms.depth_error[lane]));
+    touched &= (edges >= -FloatPacket(forms.edge_error[lane])) &
+               (highest >= load<FloatPacket>(beam_.least));
+    return to_bits(touched) & ((1u << beam_.count) - 1);
 }
 
 // One triangle against sixteen rays. Returns whether they found something.
 template <Query query>
 bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleForms &forms,
-                                           uint32_t lane, uint32_t primitive,
-                                           bool covered) {
-    ++counters_.triangle_tests;
+                                           uint32_t lane, uint32_t primitive) {
     const auto value = [&](int form) {
         return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
                      fused(packet.v, FloatPacket(forms.of_v[form][lane]),
                            FloatPacket(forms.constant[form][lane])));
     };
     const FloatPacket depth = value(TriangleForms::DEPTH);
-    const FloatPacket error(forms.depth_error[lane]);
+    const FloatPacket error(forms.depth_error[lane]), edge_error(forms.edge_error[lane]);
     const FloatPacket highest = fused(depth, FloatPacket(forms.depth_grow[lane]), error);
-    LaneBits possible = to_bits(highest >= packet.least);
-    LaneBits certain = possible;
-    if (!covered) {
-        const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-        const FloatPacket edge_error(forms.edge_error[lane]);
-        possible &= to_bits(smallest >= -edge_error);
-        if (possible == 0)
-            return false;
-        certain = possible & to_bits(smallest > edge_error);
-    } else if (possible == 0) {
-        return false;
-    }
     const FloatPacket lowest = fused(depth, FloatPacket(forms.depth_shrink[lane]), -error);
-    const LaneBits nearer =
-        certain & to_bits((lowest > packet.greatest) & (highest < packet.nearest));
-    if (nearer != 0) {
-        const auto mask = from_bits<FloatPacket>(nearer);
-        packet.found |= nearer;
-        if constexpr (query == Query::any) {
-            packet.least = select(mask, FloatPacket(INFINITE), packet.least);
-        } else {
-            packet.least = select(mask, lowest, packet.least);
-            packet.greatest = select(mask, highest, packet.greatest);
-            packet.primitive = select(from_bits<UIntPacket>(nearer), UIntPacket(primitive),
-                                      packet.primitive);
-        }
+    const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
+    const auto possible = (highest >= packet.least) & (smallest >= -edge_error);
+    const auto certain = smallest > edge_error;
+    const auto nearer =
+        possible & certain & (lowest > packet.greatest) & (highest < beam_.nearest);
+    const LaneBits found = to_bits(nearer);
+    packet.found |= found;
+    if constexpr (query == Query::any) {
+        packet.least = select(nearer, FloatPacket(INFINITE), packet.least);
+    } else {
+        packet.least = select(nearer, lowest, packet.least);
+        packet.greatest = select(nearer, highest, packet.greatest);
+        packet.primitive =
+            select(MaskOf<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
     }
-    if ((possible & ~nearer) != 0)
-        decide(packet, possible & ~nearer, certain, primitive);
-    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
-    return true;
+    const LaneBits open = to_bits(possible) & ~found;
+    if (open != 0) [[unlikely]]
+        decide(packet, open, to_bits(certain), primitive);
+    return (found | open) != 0;
 }
 
-// By the contract of geometry/triangle_test.h, ray by ray.
+// By the contract of geometry/triangle_test.h.
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                                       LaneBits certain_hits, uint32_t primitive) {
-    const Triangle &triangle = tree_.triangles[primitive];
-    LaneArray<float> least = to_lanes<float>(packet.least);
-    LaneArray<float> greatest = to_lanes<float>(packet.greatest);
-    LaneArray<uint32_t> best = to_lanes<uint32_t>(packet.primitive);
-    for_each_lane(lanes, [&](uint32_t lane) {
-        const uint32_t ray = packet.first_ray + lane;
-        const Vec3f direction = direction_of(rays_, ray);
-        ++counters_.double_tests;
-        if ((certain_hits >> lane & 1) == 0) {
-            const HitDecision decision = decide_hit(beam_.origin, direction, triangle);
-            counters_.exact_tests += decision.precision == Precision::exact;
-            if (!decision.hit)
-                return;
-        }
-        const float t = hit_distance(beam_.origin, direction, triangle);
-        if (!(t > std::max(rays_.t_min[ray], 0.0f) && t < INFINITE))
-            return;
-        if ((packet.found >> lane & 1) == 0) {
-            if (!(t <= rays_.t_max[ray]))
-                return;
-        } else {
-            const float other =
-                hit_distance(beam_.origin, direction, tree_.triangles[best[lane]]);
-            if (!(t < other || (t == other && primitive < best[lane])))
-                return;
-        }
-        packet.found |= 1u << lane;
-        best[lane] = primitive;
-        // Of the distance, of the product, and of the reciprocal; and of a distance that
-        // is denormal.
-        const double main = std::abs(direction[beam_.axes[2]]);
-        const double farthest = (double(t) + SMALLEST_FLOAT) * main;
-        least[lane] = query == Query::any
-                          ? INFINITE
-                          : float(std::min((1 - 0x1p-21) / farthest, 0x1p126));
-        greatest[lane] = float((1 + 0x1p-21) / (double(t) * main));
+    counters_.double_tests += uint64_t(std::popcount(lanes));
+    LaneBits hits = lanes & certain_hits;
+    for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
+        const HitDecision decision =
+            decide_hit(beam_.origin, direction_of(rays_, packet.first_ray + lane),
+                       tree_.triangles[primitive]);
+        counters_.exact_tests += decision.precision == Precision::exact;
+        hits |= LaneBits(decision.hit) << lane;
     });
-    packet.least = load<FloatPacket>(least);
-    packet.greatest = load<FloatPacket>(greatest);
-    packet.primitive = load<UIntPacket>(best);
+    if (hits == 0)
+        return;
+
+    const auto distances = [&](LaneBits of, const UIntPacket &primitives) {
+        return distances_.of(rays_, packet.first_ray, of, primitives, counters_);
+    };
+    const UIntPacket number(primitive);
+    const FloatPacket t = distances(hits, number);
+    const FloatPacket t_min = load_padded(rays_.t_min, packet.first_ray, rays_.count);
+    const FloatPacket t_max = load_padded(rays_.t_max, packet.first_ray, rays_.count);
+    hits &= to_bits((t > maximum(t_min, FloatPacket(0.0f))) & (t < INFINITE));
+    if (const LaneBits rivals = hits & packet.found; rivals != 0) {
+        const FloatPacket other = distances(rivals, packet.primitive);
+        const LaneBits nearer =
+            to_bits(t < other) | (to_bits(t == other) & to_bits(number < packet.primitive));
+        hits &= nearer | ~rivals;
+    }
+    hits &= to_bits(t <= t_max) | packet.found;
+    if (hits == 0)
+        return;
+
+    packet.found |= hits;
+    const auto mask = from_bits<FloatPacket>(hits);
+    packet.primitive = select(from_bits<UIntPacket>(hits), number, packet.primitive);
+    if constexpr (query == Query::any) {
+        packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+        return;
+    }
+    // Of the distance, of the product, and of the reciprocal; and of a distance that is
+    // denormal.
+    const DoublePacket main = absolute(to_double(
+        load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count)));
+    const DoublePacket distance = to_double(t);
+    const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
+    packet.least =
+        select(mask, minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
+               packet.least);
+    packet.greatest =
+        select(mask, FloatPacket((1 + 0x1p-21) / (distance * main)), packet.greatest);
 }
 
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
-void BeamTriangleTests<query>::test_unsafe(BeamPacket &packet, uint32_t primitive) {
-    const LaneBits searching = packet.active & to_bits(packet.least < INFINITE);
-    ++counters_.triangle_tests;
-    decide(packet, searching, 0, primitive);
-    beam_.least[size_t(&packet - beam_.packets.data())] = least_lane(packet.least);
+void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
+    for (uint32_t n = 0; n < beam_.count; ++n) {
+        BeamPacket &packet = beam_.packets[n];
+        decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
+    }
+    counters_.triangle_tests += beam_.count;
+    update_least((1u << beam_.count) - 1);
+}
+
+// After some packets have found something.
+template <Query query>
+void BeamTriangleTests<query>::update_least(LaneBits packets) {
+    for_each_lane(packets,
+                  [&](uint32_t n) { beam_.least[n] = least_lane(beam_.packets[n].least); });
     update_least();
 }
 
@@ -243,48 +234,5 @@ void BeamTriangleTests<query>::update_least() {
 
 template class BeamTriangleTests<Query::closest>;
 template class BeamTriangleTests<Query::any>;
-
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Counters &counters) {
-    // Fewer lanes of a triangle than this are faster one by one; chosen.
-    constexpr int FEW = 3;
-    Vec3<DoublePacket> direction;
-    for (int k = 0; k < 3; ++k)
-        direction[k] =
-            to_double(load_padded(rays.direction[k], packet.first_ray, rays.count));
-    const DoublePacket max_direction = maximum(
-        absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
-    const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(packet.primitive);
-    FloatPacket t(INFINITE);
-    LaneBits one_by_one = 0;
-    for (LaneBits left = packet.found; left != 0;) {
-        const uint32_t primitive = primitives[uint32_t(std::countr_zero(left))];
-        const LaneBits same = to_bits(packet.primitive == UIntPacket(primitive)) & left;
-        left &= ~same;
-        if (std::popcount(same) <= FEW) {
-            one_by_one |= same;
-            continue;
-        }
-        const Triangle &triangle = tree.triangles[primitive];
-        const TrianglePlane plane(triangle);
-        const Vec3d to_vertex = Vec3d(triangle.a) - Vec3d(rays.common_origin);
-        const PlaneDistance<DoublePacket> distance(
-            plane, PlaneNumerator<double>(plane, to_vertex), direction, max_direction);
-        t = select(from_bits<FloatPacket>(same), distance.template rounded<FloatPacket>(),
-                   t);
-        const LaneBits open = same & ~to_bits(distance.template certain<FloatPacket>());
-        counters.exact_distances += uint64_t(std::popcount(open));
-        one_by_one |= open;
-    }
-    if (one_by_one == 0)
-        return t;
-    LaneArray<float> distances = to_lanes<float>(t);
-    for_each_lane(one_by_one, [&](uint32_t lane) {
-        distances[lane] =
-            hit_distance(rays.common_origin, direction_of(rays, packet.first_ray + lane),
-                         tree.triangles[primitives[lane]]);
-    });
-    return load<FloatPacket>(distances);
-}
 
 } // namespace mlrt

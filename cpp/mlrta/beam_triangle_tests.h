@@ -5,6 +5,7 @@
 #include "base/counters.h"
 #include "kdtree/tree.h"
 #include "mlrta/beam_packets.h"
+#include "mlrta/hit_distances.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/triangle_forms.h"
 #include "traverse/query.h"
@@ -38,9 +39,9 @@ private:
 template <Query query>
 class BeamTriangleTests {
 public:
-    BeamTriangleTests(const KdTree &tree, const RayGroup &rays, uint32_t most_triangles,
-                      BeamPackets &beam, Counters &counters)
-        : tree_(tree), rays_(rays), beam_(beam), counters_(counters),
+    BeamTriangleTests(const KdTree &tree, const RayGroup &rays, HitDistances &distances,
+                      uint32_t most_triangles, BeamPackets &beam, Counters &counters)
+        : tree_(tree), rays_(rays), distances_(distances), beam_(beam), counters_(counters),
           triangles_left_(most_triangles) {
         update_least();
     }
@@ -59,32 +60,33 @@ public:
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
-    void test_triangle(const TriangleForms &forms, uint32_t lane, uint32_t primitive);
+    LaneBits touched_packets(const TriangleForms &forms, uint32_t lane) const;
     bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
-                     uint32_t primitive, bool covered);
-    void test_unsafe(BeamPacket &packet, uint32_t primitive);
+                     uint32_t primitive);
+    void test_unsafe(uint32_t primitive);
     void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                 uint32_t primitive);
+    void update_least(LaneBits packets);
     void update_least();
 
     const KdTree &tree_;
     const RayGroup &rays_;
+    HitDistances &distances_;
     BeamPackets &beam_;
     Counters &counters_;
     uint32_t triangles_left_;
     uint32_t tested_ = 0;
     bool dense_ = false; // whether there are many triangles
     RayGrid grid_;       // where there are
+    // Packets of the beam that triangles of a block may touch: PACKET_WIDTH times the
+    // number of the triangle plus that of the packet. What is written there comes in whole
+    // packets.
+    std::array<uint32_t, (BLOCK_WIDTH + 1) * PACKET_WIDTH> pairs_;
     std::array<uint32_t, 3 * BLOCK_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
     Mailbox mailbox_;
     float least_ = 0; // of all rays
     float far_end_ = 0;
 };
-
-// Distances of the nearest hits that a packet has found; other lanes hold any value. At
-// least one must have found something.
-FloatPacket hit_distances(const KdTree &tree, const RayGroup &rays,
-                          const BeamPacket &packet, Counters &counters);
 
 } // namespace mlrt

@@ -3,6 +3,7 @@
 
 #include "mlrta/frontier.h"
 #include "mlrta/ray_cost.h"
+#include "mlrta/tactics.h"
 #include "mlrta/trace.h"
 #include "mlrta/trace_output.h"
 #include "traverse/brute_force.h"
@@ -14,6 +15,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <span>
 
 namespace mlrt {
 
@@ -30,10 +32,12 @@ public:
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
-        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
-            const uint32_t left = first + count - i;
-            trace_lanes(i, left >= PACKET_WIDTH ? ALL_LANES : (1u << left) - 1, frontier);
-        }
+        if (options_.traversal == Traversal::single)
+            trace_singles(first, count, frontier);
+        else if (options_.traversal == Traversal::adaptive)
+            trace_either_way(first, count, frontier);
+        else
+            trace_packets(first, count, frontier);
     }
 
     // Traces those of sixteen rays from `first` on whose bit is set.
@@ -41,10 +45,6 @@ public:
         auto [packet, extreme] = load_packet<Origin>(rays_, first);
         packet.active &= lanes;
         extreme &= lanes;
-        if (options_.traversal == Traversal::single) {
-            extreme |= packet.active;
-            packet.active = 0;
-        }
         counters_.rays += uint64_t(std::popcount(packet.active | extreme));
         counters_.packets += (packet.active | extreme) != 0;
         RayCost cost(rays_, counters_);
@@ -59,6 +59,29 @@ public:
     }
 
 private:
+    // The first lanes, as many as are given or all.
+    static LaneBits lanes_below(uint32_t count) {
+        return count >= PACKET_WIDTH ? ALL_LANES : (1u << count) - 1;
+    }
+
+    void trace_packets(uint32_t first, uint32_t count, const Frontier &frontier) {
+        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
+            trace_lanes(i, lanes_below(first + count - i), frontier);
+    }
+
+    void trace_either_way(uint32_t first, uint32_t count, const Frontier &frontier) {
+        for (uint32_t done = 0; done < count; done += PacketsOrSingles::RAYS) {
+            const uint32_t rays = std::min(count - done, PacketsOrSingles::RAYS);
+            const bool singles = tactics_.choose_singles();
+            const Counters before = counters_;
+            if (singles)
+                trace_singles(first + done, rays, frontier);
+            else
+                trace_packets(first + done, rays, frontier);
+            tactics_.learn(singles, before, counters_);
+        }
+    }
+
     void trace_packet(const RayPacket<Origin> &packet, uint32_t first,
                       const Frontier &frontier) {
         PacketState<Output::query> state(packet);
@@ -113,7 +136,7 @@ private:
         }
     }
 
-    void trace_ray(uint32_t i, const Frontier &frontier) {
+    Ray ray_of(uint32_t i) const {
         Ray ray;
         ray.origin = rays_.common_origin;
         for (int k = 0; k < 3; ++k) {
@@ -123,22 +146,66 @@ private:
         }
         ray.t_min = std::max(rays_.t_min[i], 0.0f);
         ray.t_max = rays_.t_max[i];
-        if (options_.traversal == Traversal::brute_force) {
-            output_.set(i, brute_force(tree_, ray, Output::query, counters_));
-            return;
-        }
-        Hit best;
-        for (uint32_t entry = 0; entry < frontier.count; ++entry) {
-            const Hit hit =
-                trace_single(tree_, ray, Output::query, frontier.entries[entry], counters_);
-            if (hit.t < best.t || (hit.t == best.t && hit.primitive < best.primitive)) {
-                best = hit;
-                ray.t_max = hit.t;
-                if (Output::query == Query::any)
-                    break;
+        return ray;
+    }
+
+    // By X1.
+    void trace_ray(uint32_t i, const Frontier &frontier) {
+        const Ray ray = ray_of(i);
+        Hit hit;
+        if (options_.traversal == Traversal::brute_force)
+            hit = brute_force(tree_, ray, Output::query, counters_);
+        else
+            trace_rays({&ray, 1}, &hit, frontier);
+        output_.set(i, hit);
+    }
+
+    // Traces a run of rays by X1.
+    void trace_singles(uint32_t first, uint32_t count, const Frontier &frontier) {
+        constexpr uint32_t MOST = 64;
+        std::array<Ray, MOST> rays;
+        std::array<uint32_t, MOST> numbers;
+        std::array<Hit, MOST> hits;
+        for (uint32_t done = 0; done < count;) {
+            uint32_t active = 0;
+            RayCost cost(rays_, counters_);
+            const uint32_t begin = first + done;
+            for (; done < count && active + PACKET_WIDTH <= MOST; done += PACKET_WIDTH) {
+                const auto packet = load_packet<Origin>(rays_, first + done);
+                const LaneBits in_run = lanes_below(count - done);
+                const LaneBits lanes = (packet.rays.active | packet.extreme) & in_run;
+                counters_.packets += lanes != 0;
+                for_each_lane(lanes, [&](uint32_t lane) {
+                    numbers[active] = first + done + lane;
+                    rays[active] = ray_of(numbers[active]);
+                    ++active;
+                });
             }
+            counters_.rays += active;
+            trace_rays({rays.data(), active}, hits.data(), frontier);
+            for (uint32_t i = 0; i < active; ++i)
+                output_.set(numbers[i], hits[i]);
+            cost.add_to_run(begin, std::min(first + count, first + done) - begin);
         }
-        output_.set(i, best);
+    }
+
+    // Through all subtrees of a frontier; what was found in one ends the rays.
+    void trace_rays(std::span<const Ray> given, Hit *hits, const Frontier &frontier) {
+        mlrt::trace_singles(tree_, given, Output::query, frontier.entries[0], hits,
+                            counters_);
+        for (uint32_t entry = 1; entry < frontier.count; ++entry)
+            for (size_t i = 0; i < given.size(); ++i) {
+                const bool found = hits[i].primitive != NO_PRIMITIVE;
+                if (found && Output::query == Query::any)
+                    continue;
+                Ray ray = given[i];
+                ray.t_max = std::min(ray.t_max, hits[i].t);
+                const Hit hit = trace_single(tree_, ray, Output::query,
+                                             frontier.entries[entry], counters_);
+                if (hit.t < hits[i].t ||
+                    (hit.t == hits[i].t && hit.primitive < hits[i].primitive))
+                    hits[i] = hit;
+            }
     }
 
     const KdTree &tree_;
@@ -146,6 +213,7 @@ private:
     const TraceOptions &options_;
     Output output_;
     Counters &counters_;
+    PacketsOrSingles tactics_;
 };
 
 } // namespace mlrt

@@ -3,8 +3,10 @@
 #pragma once
 
 #include "mlrta/beam_packets.h"
+#include "mlrta/triangle_forms.h"
 
 #include <array>
+#include <bit>
 #include <cstdint>
 
 namespace mlrt {
@@ -16,30 +18,16 @@ public:
     // Marks the cells of all active rays.
     void fill(const BeamPackets &beam);
 
-    // Whether rays may go through a box that is given as those of triangles are: by its
-    // center relative to that of the rectangle, and half of its extents.
-    bool may_hit(float p, float q, float half_p, float half_q) const {
-        // Cells of the whole rectangle fit into int, and NaN does not come here.
-        const int first_p = cell((p - half_p) * scale_p_ - margin_p_);
-        const int last_p = cell((p + half_p) * scale_p_ + margin_p_);
-        const int first_q = cell((q - half_q) * scale_q_ - margin_q_);
-        const int last_q = cell((q + half_q) * scale_q_ + margin_q_);
-        uint64_t rays = 0;
-        for (int row = first_q; row <= last_q; ++row)
-            rays |= rows_[row];
-        return (rays >> first_p << (SIDE - 1 - (last_p - first_p))) != 0;
-    }
+    // Those of eight triangles whose boxes rays may go through.
+    LaneBits may_hit(const TriangleForms &forms, LaneBits triangles) const;
 
 private:
-    static int cell(float position) {
-        const float clamped = std::min(std::max(position + 0.5f * SIDE, 0.0f), SIDE - 1.0f);
-        return int(clamped);
-    }
-
     // Rays are where they are computed to be, but for the slack of the beam's rectangle.
     float scale_p_ = 0, scale_q_ = 0;
     float margin_p_ = 0, margin_q_ = 0;
-    std::array<uint64_t, SIDE> rows_;
+    // Entry k of a row holds the cells of the 2^k rows from there on, as far as there are
+    // any: two of them hold those of any number of rows.
+    std::array<std::array<uint64_t, SIDE>, std::bit_width(uint32_t(SIDE))> rows_;
 };
 
 } // namespace mlrt

@@ -1,5 +1,6 @@
 #include "mlrta/triangle_forms.h"
 
+#include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
 
@@ -43,26 +44,15 @@ FloatBlock largest_component(const Vec3<FloatBlock> &v) {
 
 void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
                         const uint32_t *numbers, uint32_t count) {
-    std::array<const float *, BLOCK_WIDTH> rows;
-    std::array<float, BLOCK_WIDTH> last;
-    for (uint32_t n = 0; n < BLOCK_WIDTH; ++n) {
-        const Triangle &triangle = triangles[numbers[n]];
-        rows[n] = &triangle.a.x;
-        last[n] = triangle.c.z;
-    }
-    const std::array<FloatBlock, BLOCK_WIDTH> eight = load_columns(rows);
-    const FloatBlock ninth = load<FloatBlock>(last.data());
-    const FloatBlock *const columns[9] = {&eight[0], &eight[1], &eight[2],
-                                          &eight[3], &eight[4], &eight[5],
-                                          &eight[6], &eight[7], &ninth};
+    const TriangleBlock block(triangles, numbers);
     // In the order (i, j, k), which is cyclic and keeps the sign of products.
     const auto [i, j, k] = beam.axes;
-    const auto vertex = [&](int n) -> Vec3<FloatBlock> {
-        return {*columns[3 * n + i], *columns[3 * n + j], *columns[3 * n + k]};
+    const auto vertex = [&](const Vec3<FloatBlock> &v) -> Vec3<FloatBlock> {
+        return {v[i], v[j], v[k]};
     };
     const Vec3<FloatBlock> o{FloatBlock(beam.origin[i]), FloatBlock(beam.origin[j]),
                              FloatBlock(beam.origin[k])};
-    const Vec3<FloatBlock> va = vertex(0), vb = vertex(1), vc = vertex(2);
+    const Vec3<FloatBlock> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
     const Vec3<FloatBlock> a = va - o, b = vb - o, c = vc - o;
     const Vec3<FloatBlock> ab = vb - va, bc = vc - vb, ca = va - vc;
     const Vec3<DoubleBlock> da = to_double(va);

@@ -5,6 +5,7 @@
 #include "traverse/query.h"
 
 #include <limits>
+#include <span>
 
 namespace mlrt {
 
@@ -28,5 +29,10 @@ Hit brute_force(const KdTree &tree, const Ray &ray, Query query, Counters &count
 // X1: stack traversal of the tree. Directions of any magnitude are allowed.
 Hit trace_single(const KdTree &tree, const Ray &ray, Query query, const Entry &entry,
                  Counters &counters);
+
+// The same for several rays, which take turns: `hits` has room for one each. A step of one
+// ray mostly waits for memory and for itself.
+void trace_singles(const KdTree &tree, std::span<const Ray> rays, Query query,
+                   const Entry &entry, Hit *hits, Counters &counters);
 
 } // namespace mlrt

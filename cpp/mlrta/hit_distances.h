@@ -1,0 +1,41 @@
+// Distances of hits, rounded as geometry/triangle_test.h has it, a packet at a time.
+#pragma once
+
+#include "base/counters.h"
+#include "geometry/triangle_test.h"
+#include "kdtree/tree.h"
+#include "traverse/ray_group.h"
+
+#include <array>
+#include <cstdint>
+
+namespace mlrt {
+
+// Of rays with one common origin. Neighbouring packets mostly hit the same triangles: their
+// planes are kept in a small direct-mapped table.
+class HitDistances {
+public:
+    HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {}
+
+    // Distances at which sixteen rays of a group, from `first_ray` on, meet a triangle
+    // each. The rays in the given lanes must hit it; other lanes hold any value.
+    FloatPacket of(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
+                   const UIntPacket &primitives, Counters &counters);
+
+private:
+    struct Plane {
+        uint32_t primitive = NO_PRIMITIVE;
+        TrianglePlane plane{Triangle{}};
+        PlaneNumerator<double> numerator{plane, Vec3d{}};
+    };
+
+    const Plane &plane_of(uint32_t primitive);
+
+    static constexpr uint32_t SIZE = 16;
+
+    const KdTree &tree_;
+    Vec3f origin_;
+    std::array<Plane, SIZE> planes_;
+};
+
+} // namespace mlrt
