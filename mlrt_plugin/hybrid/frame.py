@@ -136,9 +136,8 @@ class Frame:
         weight = sums[..., -1:]
         channels = sums[..., start : start + count]
         image = np.zeros(channels.shape, np.float32)
-        return np.divide(
-            channels, weight, out=image, where=weight != 0, casting="same_kind"
-        )
+        np.divide(channels, weight, out=image, where=weight != 0)
+        return image
 
 
 def moments(color: Any) -> list[Any]:
