@@ -7,16 +7,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import drjit as dr
-import mitsuba
 import numpy as np
 import numpy.typing as npt
 
 from .. import mitsuba_objects as objects
 from .direct_light import PrimaryHits
 from .samplers import IndependentStream, Pass, mitsubas_sampler, passes
-
-mi: Any = mitsuba
-"""For what Mitsuba's type stubs leave out."""
 
 AOV_CHANNELS = {"depth": 1, "normal": 3, "moment": 6}
 """Numbers a pixel of those AOVs that are filtered as colours are."""
@@ -88,7 +84,7 @@ class Frame:
         values = {
             "depth": lambda: [dr.select(si.is_valid(), si.t, 0)],
             "normal": lambda: list(dr.select(si.is_valid(), si.sh_frame.n, 0)),
-            "moment": lambda: moments(color),
+            "moment": lambda: moments(module, color),
         }
         channels = [color.x, color.y, color.z]
         for name in self._filtered:
@@ -140,10 +136,10 @@ class Frame:
         return image
 
 
-def moments(color: Any) -> list[Any]:
+def moments(module: Any, color: Any) -> list[Any]:
     """Of samples, in CIE XYZ, and their squares, as the integrator `moment` has them
     (moment.cpp)."""
-    xyz = list(mi.srgb_to_xyz(color))
+    xyz = list(module.srgb_to_xyz(color))
     return xyz + [dr.square(value) for value in xyz]
 
 
