@@ -11,7 +11,7 @@ import numpy as np
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
-from .features import FILTERS
+from .features import FILTERS, SENSORS
 from .scene_arrays import Camera, Film
 
 LARGEST_RADIUS = 64
@@ -23,28 +23,69 @@ BYTES_PER_PIXEL = 64
 
 
 def read_camera(sensor: Any, name: str) -> Camera:
-    """Reads a `perspective` sensor."""
-    if objects.plugin_name(sensor) != "perspective":
-        raise UnsupportedFeature(f"{name} is not supported: only perspective is so far")
+    """Reads a `perspective`, `thinlens` or `orthographic` sensor."""
+    plugin = objects.plugin_name(sensor)
+    if plugin not in SENSORS:
+        raise UnsupportedFeature(
+            f"{name} is not supported: only {', '.join(SENSORS)} are so far"
+        )
     parts = objects.members(sensor)
     to_world = objects.matrix(sensor.world_transform())
-    if not np.isfinite(to_world).all() or abs(np.linalg.det(to_world[:3, :3])) < 1e-6:
-        raise SceneError(f"{name} has a singular to_world: repair it")
+    objects.check_invertible(to_world, name)
+    lengths = np.linalg.norm(to_world[:3, :3], axis=0)
+    axes = to_world[:3, :3] / lengths
+    if not objects.is_orthogonal(to_world):
+        raise UnsupportedFeature(
+            f"{name} has a to_world that shears, which is not supported: take the shear out"
+        )
+    near, far = float(sensor.near_clip()), float(sensor.far_clip())
+    common: dict[str, Any] = {
+        "origin": objects.vec3(to_world[:3, 3]),
+        "axes": tuple(objects.vec3(axes[:, k]) for k in range(3)),
+        "type": plugin,
+        "samples_time": float(sensor.shutter_open_time()) > 0,
+    }
+    if plugin == "orthographic":
+        # Mitsuba scales where rays begin, but not how far they go.
+        start = near * float(lengths[2])
+        return Camera(
+            **common,
+            tan_half_fov_x=1.0,
+            near_clip=start,
+            far_clip=start + (far - near),
+            half_extent=(float(lengths[0]), float(lengths[1])),
+        )
     fov = objects.number(parts["x_fov"])
     if not 0 < fov < 180:
         raise SceneError(f"{name} has a field of view of {fov:g} degrees: choose 0 to 180")
-    axes = to_world[:3, :3] / np.linalg.norm(to_world[:3, :3], axis=0)
-    return Camera(
-        origin=objects.vec3(to_world[:3, 3]),
-        axes=(objects.vec3(axes[:, 0]), objects.vec3(axes[:, 1]), objects.vec3(axes[:, 2])),
-        tan_half_fov_x=math.tan(math.radians(fov) / 2),
-        near_clip=float(sensor.near_clip()),
-        far_clip=float(sensor.far_clip()),
-        principal_point_offset=(
-            objects.number(parts["principal_point_offset_x"]),
-            objects.number(parts["principal_point_offset_y"]),
-        ),
+    common |= {
+        "tan_half_fov_x": math.tan(math.radians(fov) / 2),
+        "near_clip": near,
+        "far_clip": far,
+    }
+    if plugin == "thinlens":
+        radius, focus = (
+            objects.number(parts[part]) for part in ("aperture_radius", "focus_distance")
+        )
+        for what, value in (("aperture_radius", radius), ("focus_distance", focus)):
+            if not (value > 0 and math.isfinite(value)):
+                raise SceneError(f"{name} has {what} = {value:g}: it must be positive")
+        return Camera(**common, aperture_radius=radius, focus_distance=focus)
+    offset_x, offset_y = (
+        objects.number(parts[f"principal_point_offset_{axis}"]) for axis in "xy"
     )
+    return Camera(**common, principal_point_offset=(offset_x, offset_y))
+
+
+def camera_warnings(camera: Camera, name: str) -> list[str]:
+    """What of a sensor is taken in another way, a sentence each."""
+    # Mitsuba takes this in place of 0 (thinlens.cpp).
+    if camera.type == "thinlens" and camera.aperture_radius <= np.finfo(np.float32).eps:
+        return [
+            f"{name} has aperture_radius = 0: it is a pinhole, which type 'perspective' "
+            "renders faster"
+        ]
+    return []
 
 
 def read_film(film: Any, name: str) -> tuple[Film, list[str]]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .elements import Element
-from .features import REFUSED, SAMPLERS, reason_against
+from .features import REFUSED, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
 from .scene_arrays import Lighting
 
@@ -55,7 +55,11 @@ REMARKS = {
     ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
     ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
+    ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
+    ("emitter", "projector"): "its picture is looked up like a texture of a surface",
+    ("sensor", "orthographic"): "without shear; else by Mitsuba",
+    ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
@@ -99,10 +103,6 @@ def row_of(kind: str, plugin: str) -> Row:
             return Row(kind, plugin, "taken over", remark)
         missing = what_is_missing(Lighting(plugin))
         return Row(kind, plugin, "with --force-direct", f"without {missing}")
-    if kind == "sampler" and plugin not in SAMPLERS:
-        return Row(
-            kind, plugin, "by Mitsuba", "native scenes take `independent`, with a warning"
-        )
     if not reason_against(Element(kind, plugin)):
         return Row(kind, plugin, "native", remark)
     if kind == "shape" and not remark:

@@ -57,7 +57,23 @@ def read_emitter(
             position=finite(objects.vec3(parts["position"]), name, "position"),
             sampling_weight=weight,
         )
+    if plugin == "constant":
+        return Emitter(
+            "constant", objects.color(parts["radiance"], name), sampling_weight=weight
+        )
     to_world = objects.matrix(emitter.world_transform())
+    if plugin == "envmap":
+        scale = objects.number(parts["scale"])
+        if not (scale >= 0 and math.isfinite(scale)):
+            raise SceneError(f"{name} has scale = {scale:g}: it must be at least 0")
+        objects.check_invertible(to_world, name)
+        first, second, third = (objects.vec3(column) for column in to_world[:3, :3].T)
+        return Emitter(
+            "envmap",
+            (scale, scale, scale),
+            axes=(first, second, third),
+            sampling_weight=weight,
+        )
     axis = unit_axis(to_world, name)
     if plugin == "directional":
         return Emitter(
@@ -83,21 +99,36 @@ def read_emitter(
             sampling_weight=weight,
         )
     raise UnsupportedFeature(
-        f"{name} is not supported: only point, spot, directional and area are so far"
+        f"{name} is not supported: only point, spot, directional, area, constant and "
+        "envmap are so far"
     )
+
+
+def read_environment(emitter: Any, name: str) -> npt.NDArray[np.float32]:
+    """(H, W, 3) float32 picture of an `envmap`, without its scale.
+
+    Raises SceneError if it holds NaN or infinity.
+    """
+    # Mitsuba puts a copy of the last column before the first, and one of the first behind.
+    padded = np.array(objects.members(emitter)["data"], np.float32)
+    picture = np.ascontiguousarray(padded[:, 1:-1, :3])
+    if not np.isfinite(picture).all():
+        file = objects.described(emitter, "filename", "its bitmap").strip('"')
+        raise SceneError(f"{name} has NaN or infinite pixels: repair '{file}'")
+    return picture
 
 
 def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> None:
     """Raises SceneError for a scene in which light cannot fall off.
 
     It does with the square of the distance, which single precision has no number for in
-    scenes beyond all measure. Directional light does not fall off.
+    scenes beyond all measure. Directional light and that from all around do not fall off.
     bounds: of all that can be hit.
     """
     if bounds[0] > bounds[1]:
         return
     for light in lights:
-        if light.type == "directional":
+        if light.type in ("directional", "constant", "envmap"):
             continue
         points = [*bounds, light.position] if light.type != "area" else [*bounds]
         extent = float(np.ptp(np.array(points, np.float64), axis=0).max())
@@ -122,8 +153,7 @@ def unit_axis(to_world: npt.NDArray[np.float64], name: str) -> Vec3:
     SceneError if it is not finite.
     """
     axes = to_world[:3, :3]
-    if not np.isfinite(to_world).all():
-        raise SceneError(f"{name} has a to_world with NaN or infinite entries: repair it")
+    objects.check_finite(to_world, name)
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-3):
         raise UnsupportedFeature(
             f"{name} has a to_world that scales, which is not supported: use a rotation "

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
+import numpy as np
+
+from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import UnsupportedFeature
 from .scene_arrays import Feature
 
 SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
 BSDFS = ("diffuse", "twosided")
-EMITTERS = ("point", "spot", "directional", "area")
-SENSORS = ("perspective",)
+EMITTERS = ("point", "spot", "directional", "area", "constant", "envmap")
+SENSORS = ("perspective", "thinlens", "orthographic")
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
-SAMPLERS = ("independent",)
+SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
 
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
@@ -36,6 +40,7 @@ NATIVE = {
     "sensor": SENSORS,
     "film": FILMS,
     "rfilter": FILTERS,
+    "sampler": SAMPLERS,
     "texture": CONSTANT_TEXTURES,
 }
 
@@ -56,8 +61,6 @@ def used_elements(scene: Element, sensor: int) -> Iterator[Element]:
 def reason_against(element: Element) -> str:
     """Why an element cannot be rendered natively; empty if it can."""
     kind, plugin = element.kind, element.plugin
-    if kind == "sampler":
-        return ""
     if kind not in NATIVE:
         return f"a {kind} is not supported yet"
     if plugin not in NATIVE[kind]:
@@ -68,6 +71,12 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
+        return "only arrays of strength 2 are supported so far"
+    if plugin == "orthographic" and shears(element.properties.get("to_world")):
+        return "its to_world shears, which is not supported yet"
+    if plugin == "envmap" and element.properties.get("mis_compensation", False):
+        return "mis_compensation counts on BSDF samples, which are not taken"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
@@ -75,6 +84,17 @@ def reason_against(element: Element) -> str:
     ):
         return "only diffuse materials can be nested in it so far"
     return ""
+
+
+def shears(to_world: Any) -> bool:
+    """Whether a transformation, None for none, makes axes that are not orthogonal; False
+    also if it is not finite or flattens, which is told elsewhere."""
+    if to_world is None:
+        return False
+    matrix = objects.matrix(to_world)
+    if not np.isfinite(matrix).all() or objects.is_singular(matrix):
+        return False
+    return not objects.is_orthogonal(matrix)
 
 
 def refuse_refused(scene: Element, sensor: int) -> None:
@@ -125,12 +145,3 @@ def place(feature: Feature, file: str) -> str:
     if file and feature.file == file:
         where = where.removeprefix(file).lstrip()
     return " ".join(filter(None, (f"'{feature.id}'" if feature.id else "", where)))
-
-
-def native_warnings(features: tuple[Feature, ...]) -> list[str]:
-    """What is done in another way natively, a sentence each."""
-    warnings = []
-    for feature in features:
-        if feature.kind == "sampler" and feature.plugin not in SAMPLERS:
-            warnings.append(f"{feature} is not supported: 'independent' is used instead")
-    return warnings

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from .errors import MlrtError
 from .scene_arrays import Camera, Film
 
 
@@ -38,8 +39,14 @@ class ImagePlane:
 
 
 def image_plane(camera: Camera, film: Film) -> ImagePlane:
-    """The map of a camera: x points to the left of the picture, y up, and the field of view
-    spans the width of the film (Mitsuba's perspective.cpp)."""
+    """The map of a `perspective` camera: x points to the left of the picture, y up, and the
+    field of view spans the width of the film (Mitsuba's perspective.cpp). Raises MlrtError
+    for another camera."""
+    if camera.type != "perspective":
+        raise MlrtError(
+            f"the rays of a camera of type '{camera.type}' have no common origin: choose a "
+            "sensor of type 'perspective'"
+        )
     x_axis, y_axis, z_axis = np.array(camera.axes, np.float64)
     tan_x = camera.tan_half_fov_x
     tan_y = tan_x * film.height / film.width

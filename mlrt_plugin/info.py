@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import mlrt_llvm
 
 from .errors import SceneError
-from .features import REFUSED, SAMPLERS, native_warnings
+from .features import REFUSED
 from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
 from .scene_import import SceneSource, SceneSummary, import_scene, summarise
 from .shading_choice import choice_for
@@ -51,8 +51,6 @@ def scene_report(
             f"film: {film.width}x{film.height}, {film.filter} filter, {arrays.spp} spp",
         ]
         warnings = list(arrays.warnings)
-    elif native:
-        warnings += native_warnings(summary.features)
     if warnings:
         lines += ["approximated or ignored:", *(f"  {text}" for text in warnings)]
     lines.append(f"shading: {choice}")
@@ -72,8 +70,6 @@ def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) ->
         if (kind, plugin) in REFUSED:
             return "not supported"
         return "hits native" if kind == "shape" and is_native else "by Mitsuba"
-    if kind == "sampler" and plugin not in SAMPLERS:
-        return "replaced"
     return "native" if is_native else "not supported"
 
 

@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
+from .errors import warn_of
 from .options import INTEGRATOR_OPTIONS
 from .render import Prepared, prepare
 from .scene_arrays import Lighting
@@ -94,6 +95,7 @@ def integrator_class(module: Any) -> type:
             result = self.prepared.render(
                 spp=spp or None, seed=int(np.asarray(seed).reshape(-1)[0])
             )
+            warn_of((m for m in result.warnings if m not in self.prepared.warnings), 2)
             if not isinstance(sensor, mi.Object):
                 sensor = scene.sensors()[sensor]
             fill_film(module, sensor.film(), result.image)

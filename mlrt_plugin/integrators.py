@@ -30,9 +30,13 @@ MISSING = {
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
 NO_BSDF_SAMPLES = (
-    "BSDF samples are not taken, so area lights are noisier or less noisy than in Mitsuba; "
-    "the expected image is the same"
+    "BSDF samples are not taken, so lights that have an area or are all around are noisier "
+    "or less noisy than in Mitsuba; the expected image is the same"
 )
+POINTLIKE = ("point", "spot", "directional")
+"""Emitters that rays cannot hit."""
+MOST_EMITTER_SAMPLES = 256
+"""Of a camera sample, natively; chosen, as memory grows with them."""
 OWN_PARAMETERS = (
     "hide_emitters",
     "emitter_samples",
@@ -190,11 +194,15 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
             f"{name} takes no emitter samples, and light is found by those only: raise "
             f"its {what}"
         )
-    counts = lighting.emitter_samples, lighting.bsdf_samples
-    if lighting.integrator == "mlrt" and counts != (1, 0):
+    if lighting.integrator == "mlrt" and lighting.bsdf_samples != 0:
         return (
-            f"{name} takes one emitter sample and no BSDF sample natively: set "
-            "emitter_samples to 1 and bsdf_samples to 0, or leave them out"
+            f"{name} takes no BSDF sample natively: set bsdf_samples to 0, or leave it out"
+        )
+    if lighting.emitter_samples > MOST_EMITTER_SAMPLES:
+        return (
+            f"{name} has emitter_samples = {lighting.emitter_samples}, and at most "
+            f"{MOST_EMITTER_SAMPLES} are taken natively: raise the samples per pixel "
+            "instead"
         )
     return ""
 
@@ -207,16 +215,19 @@ def integrator_warnings(
     missing = what_is_missing(lighting)
     if missing:
         return [f"{name}: only direct illumination is rendered; {missing} is missing"]
-    if not native or lighting.integrator in ("mlrt", "depth"):
+    if not native or lighting.integrator == "depth":
         return []
     warnings = []
-    if lighting.emitter_samples > 1:
+    if lighting.emitter_samples > 1 and any(
+        f.kind == "emitter" and f.plugin in POINTLIKE for f in features
+    ):
         warnings.append(
-            f"{name}: emitter_samples = {lighting.emitter_samples} is taken as 1; "
-            "raise the samples per pixel instead"
+            f"{name}: Mitsuba adds the light of {', '.join(POINTLIKE)} emitters "
+            f"{lighting.emitter_samples} times with emitter_samples = "
+            f"{lighting.emitter_samples} (its issue 1861), here it counts once"
         )
     if lighting.bsdf_samples > 0 and any(
-        f.kind == "emitter" and f.plugin == "area" for f in features
+        f.kind == "emitter" and f.plugin in ("area", "constant", "envmap") for f in features
     ):
         warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
     return warnings

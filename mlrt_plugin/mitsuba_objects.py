@@ -29,6 +29,8 @@ PLUGIN_OF_CLASS = {
     "ConstantBackgroundEmitter": "constant",
     "EnvironmentMapEmitter": "envmap",
     "PerspectiveCamera": "perspective",
+    "ThinLensCamera": "thinlens",
+    "OrthographicCamera": "orthographic",
     "HDRFilm": "hdrfilm",
     "BoxFilter": "box",
     "GaussianFilter": "gaussian",
@@ -37,6 +39,10 @@ PLUGIN_OF_CLASS = {
     "CatmullRomFilter": "catmullrom",
     "LanczosSincFilter": "lanczos",
     "IndependentSampler": "independent",
+    "StratifiedSampler": "stratified",
+    "MultijitterSampler": "multijitter",
+    "OrthogonalSampler": "orthogonal",
+    "LowDiscrepancySampler": "ldsampler",
     "DirectIntegrator": "direct",
     "PathIntegrator": "path",
     "DepthIntegrator": "depth",
@@ -47,6 +53,10 @@ PLUGIN_OF_CLASS = {
 }
 """Plugin names of the classes of Mitsuba that scenes commonly use; others go by their
 class."""
+
+
+ORTHOGONAL = 1e-3
+"""How large the products of axes may be that count as orthogonal."""
 
 
 def plugin_name(instance: Any) -> str:
@@ -124,6 +134,33 @@ def vec3(value: Any) -> Vec3:
 def matrix(transform: Any) -> npt.NDArray[np.float64]:
     """The (4, 4) float64 matrix of a transformation."""
     return np.asarray(np.array(transform.matrix), dtype=np.float64).reshape(4, 4)
+
+
+def is_singular(to_world: npt.NDArray[np.float64]) -> bool:
+    """Whether a finite matrix flattens what it moves."""
+    stretch = np.linalg.svd(to_world[:3, :3], compute_uv=False)
+    return bool(stretch[2] <= 1e-12 * stretch[0])
+
+
+def is_orthogonal(to_world: npt.NDArray[np.float64]) -> bool:
+    """Whether the axes of an invertible matrix are orthogonal, of any length."""
+    axes = to_world[:3, :3] / np.linalg.norm(to_world[:3, :3], axis=0)
+    return bool(np.allclose(axes.T @ axes, np.eye(3), atol=ORTHOGONAL))
+
+
+def check_invertible(to_world: npt.NDArray[np.float64], name: str) -> None:
+    """Raises SceneError for a matrix that is not finite or flattens what it moves."""
+    check_finite(to_world, name)
+    if is_singular(to_world):
+        raise SceneError(
+            f"{name} has a singular to_world, which flattens it: no scale may be 0"
+        )
+
+
+def check_finite(to_world: npt.NDArray[np.float64], name: str) -> None:
+    """Raises SceneError for a matrix that holds NaN or infinity."""
+    if not np.isfinite(to_world).all():
+        raise SceneError(f"{name} has a to_world with NaN or infinite entries: repair it")
 
 
 def color(spectrum: Any, owner: str) -> Vec3:

@@ -23,6 +23,7 @@ from .options import (
     integer,
     split_options,
 )
+from .samplers import possible_spp
 from .scene_arrays import Lighting, SceneArrays, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
@@ -127,8 +128,10 @@ class PreparedScene:
                 "aov 'moment' does not exist where shading is native: leave it out, or "
                 "choose shading = mitsuba"
             )
-        sampler = next((str(f) for f in self.arrays.features if f.kind == "sampler"), "")
-        samples = own_spp(self.arrays.spp, sampler) if spp is None else checked_spp(spp)
+        name = next((str(f) for f in self.arrays.features if f.kind == "sampler"), "")
+        asked = own_spp(self.arrays.spp, name) if spp is None else checked_spp(spp)
+        sampler, film = self.arrays.sampler, self.arrays.film
+        samples = possible_spp(sampler, asked, film.crop_width * film.crop_height)
         depth = self.lighting.integrator == "depth"
         wanted = list(
             dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(self.lighting))])
@@ -144,6 +147,8 @@ class PreparedScene:
             wanted,
             progress,
             shadow_offset,
+            {**dataclasses.asdict(sampler), "base_seed": self.arrays.base_seed},
+            max(1, self.lighting.emitter_samples),
         )
         if progress is not None:
             progress(1.0)
@@ -156,7 +161,7 @@ class PreparedScene:
             aovs=images,
             timings={**self.timings, "render": time.perf_counter() - start},
             counters=dict(result["counters"]),
-            warnings=self.warnings,
+            warnings=self.warnings + rounded(sampler.type, asked, samples),
         )
 
 
@@ -235,6 +240,7 @@ def prepare(
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
+        arrays.environment if arrays.environment.size else None,
     )
     return PreparedScene(
         arrays,
@@ -316,6 +322,13 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
+
+
+def rounded(sampler: str, asked: int, taken: int) -> tuple[str, ...]:
+    """What there is to say of samples per pixel that are not as many as were asked for."""
+    if taken == asked:
+        return ()
+    return (f"sampler '{sampler}' takes {taken} samples a pixel in place of {asked}",)
 
 
 def checked_spp(spp: int) -> int:

@@ -21,6 +21,14 @@ Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
 
 
+UNIT_AXES: tuple[Vec3, Vec3, Vec3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def no_environment() -> npt.NDArray[np.float32]:
+    """The picture of a scene without `envmap`."""
+    return np.zeros((0, 0, 3), np.float32)
+
+
 class HasGeometry(Protocol):
     """vertices: (V, 3) float32. faces: (F, 3) uint32."""
 
@@ -52,7 +60,8 @@ class Shape:
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light source; ``type`` is one of point, spot, directional and area."""
+    """A light source; ``type`` is one of point, spot, directional, area, constant and
+    envmap, of which a scene has at most one of the last two."""
 
     type: str
     radiance: Vec3
@@ -65,12 +74,18 @@ class Emitter:
     corner: Vec3 = (0.0, 0.0, 0.0)
     edge_u: Vec3 = (0.0, 0.0, 0.0)
     edge_v: Vec3 = (0.0, 0.0, 0.0)
+    axes: tuple[Vec3, Vec3, Vec3] = UNIT_AXES
     sampling_weight: float = 1.0
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A pinhole camera that looks along the third of its axes; the first points left."""
+    """A camera that looks along the third of its axes; the first points left.
+
+    type: perspective, thinlens or orthographic. half_extent: of the last, half the width of
+    the film, and what would be half its height if it were square, in scene units.
+    samples_time: whether a random number of each sample is spent on its time.
+    """
 
     origin: Vec3
     axes: tuple[Vec3, Vec3, Vec3]
@@ -78,6 +93,20 @@ class Camera:
     near_clip: float = 0.01
     far_clip: float = 1e4
     principal_point_offset: Vec2 = (0.0, 0.0)
+    type: str = "perspective"
+    half_extent: Vec2 = (1.0, 1.0)
+    aperture_radius: float = 0.0
+    focus_distance: float = 1.0
+    samples_time: bool = False
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """Where random numbers come from: ``type`` is that of a plugin. Without jitter samples
+    lie in the middle of their cells."""
+
+    type: str = "independent"
+    jitter: bool = True
 
 
 @dataclass(frozen=True)
@@ -154,6 +183,9 @@ class SceneArrays:
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
     each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
     each shape had a vertex that is not finite; they are points now.
+    sampler: of the sensor.
+    environment: (H, W, 3) float32, linear RGB radiance in latitude and longitude, the first
+    row at the pole; (0, 0, 3) if no emitter is an `envmap`.
     """
 
     vertices: npt.NDArray[np.float32]
@@ -171,7 +203,10 @@ class SceneArrays:
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
     not_finite_faces: tuple[int, ...] = ()
+    sampler: Sampler = Sampler()
+    environment: npt.NDArray[np.float32] = field(default_factory=no_environment)
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):
             array.setflags(write=False)
+        self.environment.setflags(write=False)

@@ -12,18 +12,22 @@ import mitsuba as mi
 import numpy as np
 
 from . import camera as cameras
-from . import elements, emitters, features, integrators, meshes, parsing
+from . import elements, emitters, features, integrators, meshes, parsing, samplers
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
-from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
+from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape, no_environment
 
 SceneSource = Any
 """A path of an XML file, a dictionary as ``mi.load_dict`` takes it, or a loaded
 ``mi.Scene``."""
+
+
+ENVIRONMENTS = ("constant", "envmap", "sunsky", "timed_sunsky")
+"""Emitters that light a scene from all around."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,6 @@ def import_scene(
     if obstacle:
         raise UnsupportedFeature(obstacle)
     warnings = integrators.integrator_warnings(found, lighting, native=True)
-    warnings += features.native_warnings(found)
     if not is_loaded_scene(scene):
         check_transforms(parsed)
         check_files(parsed)
@@ -214,6 +217,12 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
     of_shapes = (e for s in root.children_of("shape") for e in s.walk())
     if not alone and not any(e.kind == "emitter" for e in of_shapes):
         raise SceneError(f"{name} has no emitter, so its image would be black: add one")
+    around = [e for e in alone if e.plugin in ENVIRONMENTS]
+    if len(around) > 1:
+        raise SceneError(
+            f"{around[1]} lights {name} from all around, as {around[0]} does: a scene can "
+            "have one such emitter, remove the others"
+        )
     sensors = list(root.children_of("sensor"))
     if not sensors:
         raise SceneError(f"{name} has no sensor: add one of type perspective")
@@ -235,16 +244,7 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
         transform = element.properties.get("to_world")
         if transform is None:
             continue
-        to_world = objects.matrix(transform)
-        if not np.isfinite(to_world).all():
-            raise SceneError(
-                f"{element} has a to_world with NaN or infinite entries: repair it"
-            )
-        stretch = np.linalg.svd(to_world[:3, :3], compute_uv=False)
-        if stretch[2] <= 1e-12 * stretch[0]:
-            raise SceneError(
-                f"{element} has a singular to_world, which flattens it: no scale may be 0"
-            )
+        objects.check_invertible(objects.matrix(transform), str(element))
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
@@ -308,10 +308,20 @@ def collect(
         for index, source in enumerate(sources):
             if own is not None and own is source:
                 emitter_of_shape[number], shape_of_emitter[index] = index, number
+    environment = no_environment()
+    for source in sources:
+        if objects.plugin_name(source) == "envmap":
+            environment = emitters.read_environment(source, name_of(source))
     film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
-    sampler = sensor.sampler()
+    source = sensor.sampler()
+    element = names.get(source.id())
+    sampler, base_seed = samplers.read_sampler(
+        source, name_of(source), element.properties if element else {}
+    )
+    camera = cameras.read_camera(sensor, name_of(sensor))
+    ignored += cameras.camera_warnings(camera, name_of(sensor))
     return SceneArrays(
         vertices=geometry.vertices,
         faces=geometry.faces,
@@ -334,15 +344,17 @@ def collect(
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),
-        camera=cameras.read_camera(sensor, name_of(sensor)),
+        camera=camera,
         film=film,
         lighting=lighting,
-        spp=int(sampler.sample_count()),
-        base_seed=int(objects.described(sampler, "base_seed", "0")),
+        spp=int(source.sample_count()),
+        base_seed=base_seed,
         features=found,
         warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
+        sampler=sampler,
+        environment=environment,
     )
 
 

@@ -29,19 +29,35 @@ def values_of(plugin: Any, ending: str) -> list[list[float]]:
 
 
 def camera_of(sensor: Any) -> dict[str, Any]:
-    params = mi.traverse(sensor)
+    params = dict(mi.traverse(sensor).items())
     matrix = np.array(sensor.world_transform().matrix, np.float64)
-    return {
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    near, far = sensor.near_clip(), sensor.far_clip()
+    camera = {
         "origin": matrix[:3, 3],
-        "axes": matrix[:3, :3].T,
-        "tan_half_fov_x": math.tan(math.radians(float(params["x_fov"])) / 2),
-        "near_clip": sensor.near_clip(),
-        "far_clip": sensor.far_clip(),
-        "principal_point_offset": [
-            float(params["principal_point_offset_x"]),
-            float(params["principal_point_offset_y"]),
-        ],
+        "axes": (matrix[:3, :3] / lengths).T,
+        "near_clip": near,
+        "far_clip": far,
     }
+    if "x_fov" not in params:
+        near *= lengths[2]
+        return camera | {
+            "type": "orthographic",
+            "half_extent": lengths[:2],
+            "near_clip": near,
+            "far_clip": near + far - sensor.near_clip(),
+        }
+    camera["tan_half_fov_x"] = math.tan(math.radians(float(params["x_fov"])) / 2)
+    if "aperture_radius" in params:
+        return camera | {
+            "type": "thinlens",
+            "aperture_radius": float(params["aperture_radius"]),
+            "focus_distance": float(params["focus_distance"]),
+        }
+    camera["principal_point_offset"] = [
+        float(params[f"principal_point_offset_{axis}"]) for axis in "xy"
+    ]
+    return camera
 
 
 def film_of(film: Any, description: dict[str, Any]) -> dict[str, Any]:
@@ -66,6 +82,13 @@ def emitter_of(emitter: Any, kind: str, shape: int | None) -> dict[str, Any]:
         "type": kind,
         "sampling_weight": float(params["sampling_weight"]),
     }
+    if kind == "constant":
+        (result["radiance"],) = values_of(emitter, "radiance.value")
+        return result
+    if kind == "envmap":
+        result["radiance"] = [float(params["scale"])] * 3
+        result["axes"] = np.array(params["to_world"].matrix, np.float64)[:3, :3].T
+        return result
     if kind == "area":
         (result["radiance"],) = values_of(emitter, "radiance.value")
         result["shape"] = shape
@@ -155,6 +178,10 @@ def scene_arguments(description: dict[str, Any], **more: Any) -> dict[str, Any]:
         "film": film_of(sensor.film(), description["sensor"]["film"]),
         "hide_emitters": False,
     }
+    for emitter in emitters:
+        if kinds.get(emitter.id()) == "envmap":
+            padded = np.array(mi.traverse(emitter)["data"], np.float32)
+            arguments["environment"] = padded[:, 1:-1].copy()
     return arguments | more
 
 

@@ -88,6 +88,28 @@ def sampler(folder: Path, seed: int, samples: int, size: int, dimensions: int) -
     return np.stack([np.array(independent.next_1d()) for _ in range(dimensions)], axis=1)
 
 
+def sampler_pairs(
+    folder: Path, plugin: dict[str, Any], seed: int, pixels: int, drawn: list[int]
+) -> Any:
+    """Pairs of numbers of any sampler: shape (pixels * samples, numbers). For each 1 in
+    `drawn` a single number is drawn and left out, for each 2 a pair."""
+    import mitsuba as mi
+
+    instance = mi.load_dict(plugin)
+    samples = instance.sample_count()
+    size = pixels * samples
+    instance.set_samples_per_wavefront(samples)
+    instance.seed(seed, size)
+    columns = []
+    for count in drawn:
+        if count == 1:
+            instance.next_1d()
+            continue
+        pair = instance.next_2d()
+        columns += [np.broadcast_to(np.array(x), size) for x in (pair.x, pair.y)]
+    return np.stack(columns, axis=1)
+
+
 def image_block(
     folder: Path, filter: dict[str, Any], size: list[int], offset: list[int], samples: Any
 ) -> Any:
@@ -140,6 +162,7 @@ def main(folder: Path) -> None:
     functions = {
         "render": render,
         "sampler": sampler,
+        "sampler_pairs": sampler_pairs,
         "image_block": image_block,
         "nearest_hits": nearest_hits,
     }

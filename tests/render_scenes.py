@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 SceneDict = dict[str, Any]
 
@@ -61,7 +62,7 @@ def film(width: int = 64, height: int = 48, rfilter: str = "box", **more: Any) -
 
 
 def sensor(film_dict: SceneDict, **more: Any) -> SceneDict:
-    return {
+    result = {
         "type": "perspective",
         "fov": 45,
         "to_world": look_at((0.3, 1.2, 4), (0, 0.6, 0)),
@@ -69,6 +70,7 @@ def sensor(film_dict: SceneDict, **more: Any) -> SceneDict:
         "sampler": {"type": "independent"},
         **more,
     }
+    return {key: value for key, value in result.items() if value is not None}
 
 
 def write_ball(folder: Path, normals: bool = True) -> str:
@@ -194,6 +196,34 @@ def mesh_light(folder: Path, normals: bool) -> SceneDict:
     }
 
 
+def constant_light(**more: Any) -> SceneDict:
+    return {"type": "constant", "radiance": rgb(0.6, 0.8, 1.1), **more}
+
+
+def write_sky(folder: Path, width: int = 24, height: int = 13) -> str:
+    """A picture of a sky with a sun, a black ground and a pole brighter than its row."""
+    random = np.random.default_rng(5)
+    sky = random.uniform(0.1, 0.6, (height, width, 3)).astype(np.float32)
+    sky[..., 2] *= 2
+    sky[height // 2 + 2 :, : width // 2] = 0
+    sky[height // 4, width // 3] = (40, 36, 20)
+    sky[0, 2] = 3
+    path = folder / f"sky-{width}x{height}.exr"
+    if not path.exists():
+        mi.Bitmap(sky).write(str(path))
+    return str(path)
+
+
+def sky_light(folder: Path, **more: Any) -> SceneDict:
+    return {
+        "type": "envmap",
+        "filename": write_sky(folder),
+        "scale": 1.5,
+        "to_world": transform(rotate((0, 1, 0), 130), rotate((1, 0, 0), 15)),
+        **more,
+    }
+
+
 def several_lights(folder: Path) -> SceneDict:
     return room(
         folder,
@@ -243,6 +273,19 @@ SCENES: Mapping[str, Callable[[Path], SceneDict]] = {
     "rectangle": lambda folder: room(folder, light=rectangle_light()),
     "mesh smooth": lambda folder: room(folder, light=mesh_light(folder, True)),
     "mesh flat": lambda folder: room(folder, light=mesh_light(folder, False)),
+    "constant": lambda folder: room(folder, light=constant_light()),
+    "sky": lambda folder: room(folder, light=sky_light(folder)),
+    "large sky": lambda folder: room(
+        folder,
+        light={"type": "envmap", "filename": write_sky(folder, 300, 151)},
+        sensor=sensor(film(), to_world=look_at((0.3, 0.2, 4), (0, 2.6, 0))),
+    ),
+    "mirrored sky": lambda folder: room(
+        folder,
+        light=sky_light(folder, to_world=transform(rotate((1, 0, 0), 20), scale(-1, 1, 1))),
+        lamp=rectangle_light(),
+        sun=directional_light(),
+    ),
     "several": several_lights,
     "mirrored": mirrored,
     "gaussian": lambda folder: room(
@@ -272,6 +315,52 @@ SCENES: Mapping[str, Callable[[Path], SceneDict]] = {
                 crop_width=50,
                 crop_height=41,
             )
+        ),
+    ),
+    "lens": lambda folder: room(
+        folder,
+        light=rectangle_light(),
+        sensor=sensor(
+            film(70, 45, "gaussian"),
+            type="thinlens",
+            aperture_radius=0.15,
+            focus_distance=3.7,
+            near_clip=0.5,
+        ),
+    ),
+    "lens in a crop": lambda folder: room(
+        folder,
+        light=sky_light(folder),
+        sensor=sensor(
+            film(70, 45, crop_offset_x=11, crop_offset_y=7, crop_width=40, crop_height=30),
+            type="thinlens",
+            aperture_radius=0.3,
+            focus_distance=4.2,
+            fov_axis="y",
+        ),
+    ),
+    "parallel": lambda folder: room(
+        folder,
+        light=rectangle_light(),
+        sensor=sensor(
+            film(70, 45),
+            type="orthographic",
+            fov=None,
+            to_world=transform(look_at((0.3, 1.2, 4), (0, 0.6, 0)), scale(2.4, 2.1, 1)),
+        ),
+    ),
+    "parallel along an axis": lambda folder: room(
+        folder,
+        light=sky_light(folder),
+        sensor=sensor(
+            film(50, 64, "tent"),
+            type="orthographic",
+            fov=None,
+            to_world=transform(
+                translate(0.2, 1.1, 5), rotate((0, 1, 0), 180), scale(2, 2, 3)
+            ),
+            near_clip=1.3,
+            far_clip=4.6,
         ),
     ),
     "offset camera": lambda folder: room(

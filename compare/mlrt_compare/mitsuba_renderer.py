@@ -39,10 +39,10 @@ class MitsubaRenderer:
         self,
         settings: Settings,
         integrator: Mapping[str, Any] | None = None,
-        keep_sampler: bool = False,
+        keep_sampler: bool = True,
     ) -> None:
-        """integrator: what to render, by default `direct` with one emitter sample.
-        keep_sampler: whether to take the scene's sampler, by default `independent`."""
+        """integrator: what to render, by default `direct` without BSDF samples.
+        keep_sampler: whether to take the scene's sampler, not `independent`."""
         mi.set_variant(VARIANT)
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings

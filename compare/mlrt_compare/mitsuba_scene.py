@@ -31,13 +31,13 @@ def load_mitsuba_scene(
     settings: Settings,
     variant: str,
     integrator: Mapping[str, Any] | None = None,
-    keep_sampler: bool = False,
+    keep_sampler: bool = True,
 ) -> MitsubaScene:
     """As mi.load_file does, with sampler, film size and integrator replaced; sets the
     variant.
 
-    integrator: what to render, by default `direct` with one emitter sample.
-    keep_sampler: whether to take the scene's sampler, by default `independent`. Raises
+    integrator: what to render, by default `direct` without BSDF samples.
+    keep_sampler: whether to take the scene's sampler, not `independent`. Raises
     SceneError, one sentence, if Mitsuba cannot load the scene.
     """
     mi.set_variant(variant)
@@ -58,7 +58,9 @@ def _loaded(
     config = mi.parser.ParserConfig(variant)
     with resolving_from(settings.scene.parent, *settings.folders):
         state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
-        hide_emitters = _align(state, settings, keep_sampler)
+        _align(state, settings, keep_sampler)
+        hide_emitters = bool(_of_integrator(state, "hide_emitters", False))
+        emitter_samples = max(1, int(_of_integrator(state, "emitter_samples", 1)))
         # Merging moves meshes to the end, and lights with them; the order of the
         # emitters decides what a random number means, so it has to stay as declared.
         config.merge_meshes = not any(
@@ -69,7 +71,7 @@ def _loaded(
         scene = mi.parser.instantiate(config, state)
     default = {
         "type": "direct",
-        "emitter_samples": 1,
+        "emitter_samples": emitter_samples,
         "bsdf_samples": 0,
         "hide_emitters": hide_emitters,
     }
@@ -77,10 +79,17 @@ def _loaded(
     return MitsubaScene(scene, mi.load_dict(dict(integrator or default)), spp)
 
 
-def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
-    """Gives every sensor the independent sampler and the wanted size; tells
-    hide_emitters."""
-    hide_emitters = False
+def _of_integrator(state: Any, name: str, otherwise: Any) -> Any:
+    """A parameter of the scene's integrator, nested or not."""
+    for node in state.nodes:
+        if node.type == mi.ObjectType.Integrator and name in node.props:
+            return node.props[name]
+    return otherwise
+
+
+def _align(state: Any, settings: Settings, keep_sampler: bool) -> None:
+    """Gives every sensor the wanted size, and the independent sampler if its own is not to
+    be kept."""
     for node in state.nodes:
         if node.type == mi.ObjectType.Sampler and not keep_sampler:
             sampler = mi.Properties("independent")
@@ -93,6 +102,3 @@ def _align(state: Any, settings: Settings, keep_sampler: bool) -> bool:
             node.props["pixel_format"] = "rgb"
             if settings.resolution is not None:
                 node.props["width"], node.props["height"] = settings.resolution
-        elif node.type == mi.ObjectType.Integrator and "hide_emitters" in node.props:
-            hide_emitters = bool(node.props["hide_emitters"])
-    return hide_emitters

@@ -15,7 +15,7 @@ struct Counters {
     uint64_t triangle_tests = 0;  // packet against triangle
     uint64_t beams = 0;           // that went on to leaves (X4)
     uint64_t beam_steps = 0;      // nodes visited by them, leaves included
-    uint64_t beam_blocks = 0;     // up to eight triangles against a beam
+    uint64_t beam_blocks = 0;     // a few triangles side by side against a beam
     uint64_t beam_triangles = 0;  // triangles that a beam was found to meet
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round

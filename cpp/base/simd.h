@@ -11,6 +11,7 @@
 
 #include "base/vec.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -31,7 +32,16 @@ using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 inline constexpr uint32_t BLOCK_WIDTH = 8;
 using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
 using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
-using IntBlock = drjit::Packet<int32_t, BLOCK_WIDTH>;
+
+// As many triangles as one register holds: where there are many of them.
+#if defined(__AVX512F__)
+inline constexpr uint32_t WIDE_WIDTH = 16;
+#else
+inline constexpr uint32_t WIDE_WIDTH = BLOCK_WIDTH;
+#endif
+using FloatWide = drjit::Packet<float, WIDE_WIDTH>;
+using DoubleWide = drjit::Packet<double, WIDE_WIDTH>;
+using IntWide = drjit::Packet<int32_t, WIDE_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -119,6 +129,18 @@ inline FloatPacket arc_cosine(const FloatPacket &a) {
 inline FloatPacket sine(const FloatPacket &a) {
     return drjit::sin(a);
 }
+inline FloatPacket cosine(const FloatPacket &a) {
+    return drjit::cos(a);
+}
+
+// The angle of the point (x, y), from -pi to pi.
+inline FloatPacket arc_tangent(const FloatPacket &y, const FloatPacket &x) {
+    return drjit::atan2(y, x);
+}
+
+inline FloatPacket floor(const FloatPacket &a) {
+    return drjit::floor(a);
+}
 
 // a * b + c, rounded once: every processor we build for has it as an instruction.
 template <typename T>
@@ -127,6 +149,11 @@ T fused(const T &a, const T &b, const T &c) {
         return std::fma(a, b, c);
     else
         return drjit::fmadd(a, b, c);
+}
+
+// a where t is 0, b where it is 1, and linear between them, rounded as Mitsuba does it.
+inline FloatPacket mix(const FloatPacket &a, const FloatPacket &b, const FloatPacket &t) {
+    return fused(b, t, fused(-a, t, a));
 }
 
 // The size of a with the sign of b.
@@ -236,6 +263,11 @@ void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
 }
 
+// values[indices[lane]] in each lane; indices below 2^31.
+inline FloatPacket gather(const float *values, const UIntPacket &indices) {
+    return drjit::gather<FloatPacket>(values, indices);
+}
+
 // Lanes 0 to 7 to one place, lanes 8 to 15 to another.
 template <typename Packet, typename Value>
 void store_halves(Value *low, Value *high, const Packet &packet) {
@@ -342,8 +374,8 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
 }
 
-// Eight rows of eight values as columns: result[i] holds value i of each row.
-inline std::array<FloatBlock, BLOCK_WIDTH>
+// Rows of eight values as columns: result[i] holds value i of each row.
+inline std::array<FloatBlock, 8>
 load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
 #if defined(__AVX__)
     const auto row = [&](int i) { return _mm256_loadu_ps(rows[i]); };
@@ -358,14 +390,14 @@ load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
             quad[i + 2 * j] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(1, 0, 1, 0));
             quad[i + 2 * j + 1] = _mm256_shuffle_ps(a, b, _MM_SHUFFLE(3, 2, 3, 2));
         }
-    std::array<FloatBlock, BLOCK_WIDTH> columns;
+    std::array<FloatBlock, 8> columns;
     for (int i = 0; i < 4; ++i) {
         columns[i] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x20));
         columns[i + 4] = FloatBlock(_mm256_permute2f128_ps(quad[i], quad[i + 4], 0x31));
     }
     return columns;
 #else
-    std::array<FloatBlock, BLOCK_WIDTH> columns;
+    std::array<FloatBlock, 8> columns;
     for (uint32_t i = 0; i < BLOCK_WIDTH; ++i) {
         std::array<float, BLOCK_WIDTH> column;
         for (uint32_t j = 0; j < BLOCK_WIDTH; ++j)
@@ -374,6 +406,18 @@ load_columns(const std::array<const float *, BLOCK_WIDTH> &rows) {
     }
     return columns;
 #endif
+}
+
+inline std::array<FloatPacket, 8>
+load_columns(const std::array<const float *, PACKET_WIDTH> &rows) {
+    std::array<const float *, BLOCK_WIDTH> low, high;
+    std::copy_n(rows.begin(), BLOCK_WIDTH, low.begin());
+    std::copy_n(rows.begin() + BLOCK_WIDTH, BLOCK_WIDTH, high.begin());
+    const std::array<FloatBlock, 8> a = load_columns(low), b = load_columns(high);
+    std::array<FloatPacket, 8> columns;
+    for (size_t i = 0; i < 8; ++i)
+        columns[i] = FloatPacket(a[i], b[i]);
+    return columns;
 }
 
 // Asks for the cache lines of an object that will be read soon.

@@ -1,9 +1,11 @@
 // The function render: a picture as NumPy arrays, with progress and Ctrl-C.
 #include "bind/arrays.h"
 #include "bind/bind.h"
+#include "bind/fields.h"
 #include "bind/scene_handle.h"
 #include "bind/trace_options.h"
 #include "bind/watch.h"
+#include "render/filter.h"
 #include "render/render.h"
 
 #include <chrono>
@@ -20,10 +22,12 @@ namespace mlrt {
 namespace {
 
 constexpr const char *RENDER_DOCSTRING =
-    R"(Renders direct light with one emitter sample a camera sample.
+    R"(Renders direct light from samples of emitters.
 
 options: fields of TraceOptions (mlrta/trace.h), names of enumerators as str; they never
 change the picture.
+sampler: fields of Sampler (render/spread_samples.h), the type by its name.
+emitter_samples: of each camera sample.
 shadow_offset: where shadow rays begin and end, 'mitsuba' or 'robust' (render/shadow_offset.h).
 aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
 'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
@@ -63,9 +67,23 @@ ShadowOffset shadow_offset_from(const std::string &name) {
     refuse_value("shadow_offset must be 'mitsuba' or 'robust', not '" + name + "'.");
 }
 
+void check_sampling(const Film &film, uint32_t spp, const Sampling &sampling) {
+    constexpr uint32_t MAX_EMITTER_SAMPLES = 256; // chosen: memory grows with them
+    if (sampling.emitter_samples == 0 || sampling.emitter_samples > MAX_EMITTER_SAMPLES)
+        refuse_value("emitter_samples must be from 1 to 256.");
+    if (!takes(sampling.sampler.type, spp))
+        refuse_value("spp = " + std::to_string(spp) +
+                     " is no number of samples that the sampler can take.");
+    const PixelRect sampled = sampled_pixels(film, ReconstructionFilter(film));
+    const uint64_t samples = uint64_t(sampled.width) * sampled.height * spp;
+    if (sampling.sampler.type != SamplerType::independent && samples > 0xffffffffu)
+        refuse_value("The sampler numbers samples in 32 bits, and the picture has more.");
+}
+
 nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
                       const nb::dict &options, const std::vector<std::string> &aovs,
-                      nb::object progress, const std::string &shadow_offset) {
+                      nb::object progress, const std::string &shadow_offset,
+                      const nb::dict &sampler, uint32_t emitter_samples) {
     if (spp == 0)
         refuse_value("spp must be at least 1.");
     if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
@@ -76,6 +94,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     settings.trace = trace_options_from(options);
     settings.aovs = aovs_from(aovs);
     settings.shadow_offset = shadow_offset_from(shadow_offset);
+    settings.sampling = {sampler_from(sampler), emitter_samples};
+    check_sampling(handle.scene->data.film, spp, settings.sampling);
 
     // Keeps the scene alive: another thread may drop the handle meanwhile.
     const std::shared_ptr<const PreparedScene> scene = handle.scene;
@@ -113,10 +133,27 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
 
 } // namespace
 
+Sampler sampler_from(nb::handle dict) {
+    Fields fields(dict, "sampler");
+    Sampler sampler;
+    sampler.type = fields.choice<SamplerType>("type",
+                                              {{"independent", SamplerType::independent},
+                                               {"stratified", SamplerType::stratified},
+                                               {"multijitter", SamplerType::multijitter},
+                                               {"orthogonal", SamplerType::orthogonal},
+                                               {"ldsampler", SamplerType::ldsampler}},
+                                              SamplerType::independent);
+    sampler.base_seed = fields.integer_or("base_seed", 0);
+    sampler.jitter = fields.boolean("jitter", true);
+    fields.finish();
+    return sampler;
+}
+
 void bind_render(nb::module_ &m) {
     m.def("render", &render_scene, nb::arg("scene"), nb::arg("spp"), nb::arg("seed") = 0,
           nb::arg("options") = nb::dict(), nb::arg("aovs") = std::vector<std::string>(),
           nb::arg("progress") = nb::none(), nb::arg("shadow_offset") = "mitsuba",
+          nb::arg("sampler") = nb::dict(), nb::arg("emitter_samples") = 1,
           RENDER_DOCSTRING);
 }
 

@@ -9,6 +9,7 @@
 #include "render/sampler.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
+#include "render/spread_samples.h"
 #include "render/surface.h"
 #include "render/work_items.h"
 
@@ -43,6 +44,21 @@ std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t 
     std::vector<float> numbers(dimensions);
     for (float &number : numbers)
         number = random.next_float();
+    return numbers;
+}
+
+// Pairs of numbers, one after the other; 1: a single number that is dropped, else 2.
+std::vector<float> spread_sample(const nb::dict &dict, uint32_t seed, uint32_t samples,
+                                 uint32_t index, const std::vector<int> &drawn) {
+    const Sampler sampler = sampler_from(dict);
+    std::vector<float> x(drawn.size()), y(drawn.size()), numbers;
+    std::vector<NumberPair> pairs;
+    for (size_t i = 0; i < drawn.size(); ++i)
+        pairs.push_back(drawn[i] == 2 ? NumberPair{&x[i], &y[i]} : NumberPair{});
+    draw_spread_numbers(sampler, &seed, &index, 1, samples, pairs);
+    for (size_t i = 0; i < drawn.size(); ++i)
+        if (drawn[i] == 2)
+            numbers.insert(numbers.end(), {x[i], y[i]});
     return numbers;
 }
 
@@ -233,6 +249,9 @@ void bind_render_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("render_selftest", "Parts of the renderer, for tests.");
     s.def("sampler_stream", &sampler_stream, nb::arg("seed"), nb::arg("pixel_count"),
           nb::arg("samples"), nb::arg("pixel"), nb::arg("sample"), nb::arg("dimensions"));
+    s.def("spread_sample", &spread_sample, nb::arg("sampler"), nb::arg("seed"),
+          nb::arg("samples"), nb::arg("index"), nb::arg("drawn"),
+          "Numbers of one sample; drawn: 2 for each pair, 1 for a number that is dropped.");
     s.def("image_plane", &image_plane_map, nb::arg("camera"), nb::arg("film"));
     s.def("camera_direction", &camera_direction, nb::arg("camera"), nb::arg("film"),
           nb::arg("x"), nb::arg("y"));

@@ -80,7 +80,9 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
         fields.choice<EmitterType>("type", {{"point", EmitterType::point},
                                             {"spot", EmitterType::spot},
                                             {"directional", EmitterType::directional},
-                                            {"area", EmitterType::area}});
+                                            {"area", EmitterType::area},
+                                            {"constant", EmitterType::constant},
+                                            {"envmap", EmitterType::envmap}});
     const bool point = emitter.type == EmitterType::point;
     const bool spot = emitter.type == EmitterType::spot;
     const bool directional = emitter.type == EmitterType::directional;
@@ -101,6 +103,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.corner = rectangle ? fields.vector("corner") : fields.vector("corner", {});
     emitter.edge_u = rectangle ? fields.vector("edge_u") : fields.vector("edge_u", {});
     emitter.edge_v = rectangle ? fields.vector("edge_v") : fields.vector("edge_v", {});
+    if (fields.has("axes"))
+        emitter.axes = fields.vectors("axes");
     emitter.sampling_weight = fields.number("sampling_weight", 1);
     fields.finish();
 
@@ -110,7 +114,43 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
         refuse_value(fields.path("beam_width") + " must be from 0 to the cut-off angle.");
     if (area && emitter.shape == NONE)
         refuse_value(fields.path("shape") + " must name the shape that glows.");
+    const double volume =
+        dot(Vec3d(emitter.axes[0]), cross(Vec3d(emitter.axes[1]), Vec3d(emitter.axes[2])));
+    if (!(std::abs(volume) > 0))
+        refuse_value(fields.path("axes") + " must be linearly independent.");
     return emitter;
+}
+
+EnvironmentPicture environment_from(const Array<float> &array) {
+    constexpr uint64_t MAX_PIXELS = 1ull << 29; // numbers of their colours have 31 bits
+    if (!array.is_valid())
+        return {};
+    if (array.ndim() != 3 || array.shape(0) < 3 || array.shape(1) < 2 ||
+        array.shape(2) != 3)
+        refuse_value("environment must have shape (H, W, 3), H at least 3 and W at least "
+                     "2.");
+    if (uint64_t(array.shape(0)) * (array.shape(1) + 2) > MAX_PIXELS)
+        refuse_value("environment must have at most 2^29 pixels.");
+    EnvironmentPicture picture{uint32_t(array.shape(1)),
+                               uint32_t(array.shape(0)),
+                               {array.data(), array.data() + array.size()}};
+    for (const float value : picture.rgb)
+        if (!std::isfinite(value))
+            refuse_value("environment must be finite.");
+    return picture;
+}
+
+// Light from all around comes from one emitter at most, and a picture belongs to it.
+void check_environment(const SceneData &scene) {
+    size_t environments = 0, pictures = 0;
+    for (const Emitter &emitter : scene.emitters) {
+        environments += is_environment(emitter.type);
+        pictures += emitter.type == EmitterType::envmap;
+    }
+    if (environments > 1)
+        refuse_value("emitters must have at most one of the types constant and envmap.");
+    if ((pictures > 0) != (scene.environment.width > 0))
+        refuse_value("environment must be given if and only if an emitter is an envmap.");
 }
 
 // Shapes cover the faces in order, and refer to their emitters as these refer to them.
@@ -169,7 +209,8 @@ void check_vertices(const SceneData &scene) {
 SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &normals, const nb::list &shapes,
                        const Array<float> &materials, const nb::list &emitters,
-                       const nb::dict &camera, const nb::dict &film, bool hide_emitters) {
+                       const nb::dict &camera, const nb::dict &film, bool hide_emitters,
+                       const Array<float> &environment) {
     SceneData scene;
     scene.tree = tree.tree;
     scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
@@ -189,6 +230,8 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
     scene.camera = camera_from(camera);
     scene.film = film_from(film);
     scene.hide_emitters = hide_emitters;
+    scene.environment = environment_from(environment);
+    check_environment(scene);
     check_shapes(scene);
     check_vertices(scene);
     return {std::make_shared<const PreparedScene>(std::move(scene))};
@@ -201,7 +244,21 @@ Camera camera_from(nb::handle dict) {
     Camera camera;
     camera.origin = fields.vector("origin");
     camera.axes = fields.vectors("axes");
-    camera.tan_half_fov_x = fields.number("tan_half_fov_x");
+    camera.type = fields.choice<CameraType>("type",
+                                            {{"perspective", CameraType::perspective},
+                                             {"thinlens", CameraType::thinlens},
+                                             {"orthographic", CameraType::orthographic}},
+                                            CameraType::perspective);
+    const bool lens = camera.type == CameraType::thinlens;
+    camera.tan_half_fov_x = camera.type == CameraType::orthographic
+                                ? fields.number("tan_half_fov_x", 1)
+                                : fields.number("tan_half_fov_x");
+    camera.half_extent = fields.vector2("half_extent", {1, 1});
+    camera.aperture_radius =
+        lens ? fields.number("aperture_radius") : fields.number("aperture_radius", 0);
+    camera.focus_distance =
+        lens ? fields.number("focus_distance") : fields.number("focus_distance", 1);
+    camera.samples_time = fields.boolean("samples_time", false);
     camera.near_clip = fields.number("near_clip");
     camera.far_clip = fields.number("far_clip");
     camera.principal_point_offset = fields.vector2("principal_point_offset", {});
@@ -212,6 +269,12 @@ Camera camera_from(nb::handle dict) {
                 refuse_value("camera['axes'] must be orthogonal unit vectors.");
     if (!(camera.tan_half_fov_x > 0))
         refuse_value("camera['tan_half_fov_x'] must be positive.");
+    if (!(camera.half_extent.x > 0 && camera.half_extent.y > 0))
+        refuse_value("camera['half_extent'] must be positive.");
+    if (!(camera.aperture_radius >= 0))
+        refuse_value("camera['aperture_radius'] must not be negative.");
+    if (!(camera.focus_distance > 0))
+        refuse_value("camera['focus_distance'] must be positive.");
     if (!(camera.near_clip >= 0 && camera.far_clip > camera.near_clip))
         refuse_value(
             "camera['far_clip'] must exceed camera['near_clip'], which must not be "
@@ -269,10 +332,12 @@ void bind_scene(nb::module_ &m) {
             nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
             nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"), nb::arg("camera"),
             nb::arg("film"), nb::arg("hide_emitters") = false,
+            nb::arg("environment").none() = nb::none(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
             "vertex normals. normals: float32 (V, 3) or (0, 3). shapes, emitters: lists of "
             "dicts, camera, film: dicts; keys are the fields of the structs in "
             "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
+            "environment: float32 (H, W, 3), the picture of the emitter that is an envmap. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

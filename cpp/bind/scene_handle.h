@@ -2,6 +2,7 @@
 #pragma once
 
 #include "render/prepared_scene.h"
+#include "render/spread_samples.h"
 
 #include <memory>
 #include <nanobind/nanobind.h>
@@ -14,5 +15,6 @@ struct SceneHandle {
 
 Camera camera_from(nanobind::handle dict);
 Film film_from(nanobind::handle dict);
+Sampler sampler_from(nanobind::handle dict);
 
 } // namespace mlrt

@@ -1,4 +1,4 @@
-// Eight triangles side by side.
+// Triangles side by side: eight, or as many as a register holds.
 #pragma once
 
 #include "base/simd.h"
@@ -9,22 +9,25 @@
 
 namespace mlrt {
 
+template <typename Real>
 struct TriangleBlock {
-    Vec3<FloatBlock> a, b, c;
+    static constexpr size_t WIDTH = sizeof(Real) / sizeof(float);
 
-    // Those with eight numbers, which need not differ.
+    Vec3<Real> a, b, c;
+
+    // Those with WIDTH numbers, which need not differ.
     TriangleBlock(const Triangle *triangles, const uint32_t *numbers) {
-        std::array<const float *, BLOCK_WIDTH> rows;
-        std::array<float, BLOCK_WIDTH> last;
-        for (uint32_t n = 0; n < BLOCK_WIDTH; ++n) {
+        std::array<const float *, WIDTH> rows;
+        std::array<float, WIDTH> last;
+        for (size_t n = 0; n < WIDTH; ++n) {
             const Triangle &triangle = triangles[numbers[n]];
             rows[n] = &triangle.a.x;
             last[n] = triangle.c.z;
         }
-        const std::array<FloatBlock, BLOCK_WIDTH> columns = load_columns(rows);
+        const std::array<Real, 8> columns = load_columns(rows);
         a = {columns[0], columns[1], columns[2]};
         b = {columns[3], columns[4], columns[5]};
-        c = {columns[6], columns[7], load<FloatBlock>(last.data())};
+        c = {columns[6], columns[7], load<Real>(last.data())};
     }
 };
 

@@ -33,12 +33,12 @@ void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
         if (dense_) {
             prefetch(&tree_.triangles[primitive]);
             if (waiting_count_ == waiting_.size()) {
-                test_block(waiting_.data(), BLOCK_WIDTH);
-                waiting_count_ -= BLOCK_WIDTH;
-                std::copy_n(waiting_.begin() + BLOCK_WIDTH, waiting_count_,
+                test_block(waiting_.data(), WIDE_WIDTH);
+                waiting_count_ -= WIDE_WIDTH;
+                std::copy_n(waiting_.begin() + WIDE_WIDTH, waiting_count_,
                             waiting_.begin());
             }
-        } else if (waiting_count_ == BLOCK_WIDTH) {
+        } else if (waiting_count_ == WIDE_WIDTH) {
             flush();
         }
     }
@@ -49,9 +49,9 @@ void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
 // Tests the triangles that wait.
 template <Query query>
 void BeamTriangleTests<query>::flush() {
-    std::array<uint32_t, BLOCK_WIDTH> numbers;
-    for (uint32_t first = 0; first < waiting_count_; first += BLOCK_WIDTH) {
-        const uint32_t count = std::min(waiting_count_ - first, BLOCK_WIDTH);
+    std::array<uint32_t, WIDE_WIDTH> numbers;
+    for (uint32_t first = 0; first < waiting_count_; first += WIDE_WIDTH) {
+        const uint32_t count = std::min(waiting_count_ - first, WIDE_WIDTH);
         numbers.fill(waiting_[first]);
         std::copy_n(waiting_.begin() + first, count, numbers.begin());
         test_block(numbers.data(), count);

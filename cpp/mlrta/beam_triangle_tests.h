@@ -81,8 +81,8 @@ private:
     // Packets of the beam that triangles of a block may touch: PACKET_WIDTH times the
     // number of the triangle plus that of the packet. What is written there comes in whole
     // packets.
-    std::array<uint32_t, (BLOCK_WIDTH + 1) * PACKET_WIDTH> pairs_;
-    std::array<uint32_t, 3 * BLOCK_WIDTH> waiting_;
+    std::array<uint32_t, (WIDE_WIDTH + 1) * PACKET_WIDTH> pairs_;
+    std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
     Mailbox mailbox_;
     float least_ = 0; // of all rays

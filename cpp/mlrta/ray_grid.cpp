@@ -43,20 +43,20 @@ void RayGrid::fill(const BeamPackets &beam) {
 }
 
 LaneBits RayGrid::may_hit(const TriangleForms &forms, LaneBits triangles) const {
-    using Cells = std::array<int32_t, BLOCK_WIDTH>;
+    using Cells = std::array<int32_t, WIDE_WIDTH>;
     // NaN does not come here.
-    const auto cells = [](const FloatBlock &position) {
+    const auto cells = [](const FloatWide &position) {
         Cells cells;
-        store(cells.data(), IntBlock(clamped(position + 0.5f * SIDE)));
+        store(cells.data(), IntWide(clamped(position + 0.5f * SIDE)));
         return cells;
     };
     const auto first = [&](const float *middle, const float *half, float scale,
                            float margin) {
-        return cells((load<FloatBlock>(middle) - load<FloatBlock>(half)) * scale - margin);
+        return cells((load<FloatWide>(middle) - load<FloatWide>(half)) * scale - margin);
     };
     const auto last = [&](const float *middle, const float *half, float scale,
                           float margin) {
-        return cells((load<FloatBlock>(middle) + load<FloatBlock>(half)) * scale + margin);
+        return cells((load<FloatWide>(middle) + load<FloatWide>(half)) * scale + margin);
     };
     const Cells first_p = first(forms.box_p, forms.box_half_p, scale_p_, margin_p_);
     const Cells last_p = last(forms.box_p, forms.box_half_p, scale_p_, margin_p_);

@@ -18,7 +18,7 @@ public:
     // Marks the cells of all active rays.
     void fill(const BeamPackets &beam);
 
-    // Those of eight triangles whose boxes rays may go through.
+    // Those of a block of triangles whose boxes rays may go through.
     LaneBits may_hit(const TriangleForms &forms, LaneBits triangles) const;
 
 private:

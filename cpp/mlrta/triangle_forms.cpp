@@ -36,43 +36,44 @@ constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
 // What is certain of the volume: that no more than this share of it is error.
 constexpr float LARGEST_SHARE = 0.25f;
 
-FloatBlock largest_component(const Vec3<FloatBlock> &v) {
+template <typename Real>
+Real largest_component(const Vec3<Real> &v) {
     return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
 }
 
 } // namespace
 
-void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
-                        const uint32_t *numbers, uint32_t count) {
-    const TriangleBlock block(triangles, numbers);
+template <typename Real>
+void TriangleForms::set_block(const BeamPackets &beam, float least,
+                              const Triangle *triangles, const uint32_t *numbers,
+                              uint32_t count) {
+    const TriangleBlock<Real> block(triangles, numbers);
     // In the order (i, j, k), which is cyclic and keeps the sign of products.
     const auto [i, j, k] = beam.axes;
-    const auto vertex = [&](const Vec3<FloatBlock> &v) -> Vec3<FloatBlock> {
+    const auto vertex = [&](const Vec3<Real> &v) -> Vec3<Real> {
         return {v[i], v[j], v[k]};
     };
-    const Vec3<FloatBlock> o{FloatBlock(beam.origin[i]), FloatBlock(beam.origin[j]),
-                             FloatBlock(beam.origin[k])};
-    const Vec3<FloatBlock> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
-    const Vec3<FloatBlock> a = va - o, b = vb - o, c = vc - o;
-    const Vec3<FloatBlock> ab = vb - va, bc = vc - vb, ca = va - vc;
-    const Vec3<DoubleBlock> da = to_double(va);
-    const Vec3<DoubleBlock> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
-    const Vec3<FloatBlock> normals[4] = {
-        cross(b, bc),
-        cross(c, ca),
-        cross(a, ab),
-        {FloatBlock(d_normal.x), FloatBlock(d_normal.y), FloatBlock(d_normal.z)}};
-    const FloatBlock volume(dot(da - to_double(o), d_normal));
+    const Vec3<Real> o{Real(beam.origin[i]), Real(beam.origin[j]), Real(beam.origin[k])};
+    const Vec3<Real> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
+    const Vec3<Real> a = va - o, b = vb - o, c = vc - o;
+    const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
+    const Vec3<DoubleOf<Real>> da = to_double(va);
+    const Vec3<DoubleOf<Real>> d_normal = cross(to_double(vb) - da, to_double(vc) - da);
+    const Vec3<Real> normals[4] = {cross(b, bc),
+                                   cross(c, ca),
+                                   cross(a, ab),
+                                   {Real(d_normal.x), Real(d_normal.y), Real(d_normal.z)}};
+    const Real volume(dot(da - to_double(o), d_normal));
 
-    const FloatBlock size =
+    const Real size =
         maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
-    const FloatBlock edge = maximum(largest_component(ab),
-                                    maximum(largest_component(bc), largest_component(ca)));
-    const FloatBlock volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
-                                    (2 * FLOAT_ROUNDOFF) * absolute(volume);
-    const FloatBlock inverse = 1.0f / volume;
-    const FloatBlock inverse_size = absolute(inverse);
-    const FloatBlock share = volume_error * inverse_size;
+    const Real edge = maximum(largest_component(ab),
+                              maximum(largest_component(bc), largest_component(ca)));
+    const Real volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
+                              (2 * FLOAT_ROUNDOFF) * absolute(volume);
+    const Real inverse = 1.0f / volume;
+    const Real inverse_size = absolute(inverse);
+    const Real share = volume_error * inverse_size;
     const auto safe = (size < LARGEST_SIZE) & (absolute(volume) > SMALLEST_VOLUME) &
                       (share <= LARGEST_SHARE);
     const LaneBits given = (1u << count) - 1;
@@ -82,45 +83,43 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     if (safe_bits == 0)
         return;
 
-    const FloatBlock sum(beam.greatest_sum);
-    const FloatBlock edge_bound =
+    const Real sum(beam.greatest_sum);
+    const Real edge_bound =
         (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
-    const FloatBlock depth_bound =
+    const Real depth_bound =
         (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) * sum *
         inverse_size;
     store(edge_error, edge_bound);
 
     const SlopeRectangle &rectangle = beam.rectangle;
-    const FloatBlock center_u(rectangle.center_u), center_v(rectangle.center_v);
-    const FloatBlock cosine(rectangle.cosine), sine(rectangle.sine);
-    const FloatBlock half_p(rectangle.half_p), half_q(rectangle.half_q);
-    MaskOf<FloatBlock> inside = safe;
+    const Real center_u(rectangle.center_u), center_v(rectangle.center_v);
+    const Real cosine(rectangle.cosine), sine(rectangle.sine);
+    const Real half_p(rectangle.half_p), half_q(rectangle.half_q);
+    MaskOf<Real> inside = safe;
 
     // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
     // two products and a sum follow, and the middle and extent of all: less than 16 of at
     // most the greatest coordinate and S.
-    FloatBlock lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
-    for (const Vec3<FloatBlock> *vertex_seen : {&a, &b, &c}) {
-        const FloatBlock reciprocal = 1.0f / (vertex_seen->z * beam.side);
-        const FloatBlock du = vertex_seen->x * reciprocal - center_u;
-        const FloatBlock dv = vertex_seen->y * reciprocal - center_v;
-        const FloatBlock p = fused(du, cosine, dv * sine);
-        const FloatBlock q = fused(dv, cosine, -(du * sine));
+    Real lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
+    for (const Vec3<Real> *vertex_seen : {&a, &b, &c}) {
+        const Real reciprocal = 1.0f / (vertex_seen->z * beam.side);
+        const Real du = vertex_seen->x * reciprocal - center_u;
+        const Real dv = vertex_seen->y * reciprocal - center_v;
+        const Real p = fused(du, cosine, dv * sine);
+        const Real q = fused(dv, cosine, -(du * sine));
         lo_p = minimum(p, lo_p);
         hi_p = maximum(p, hi_p);
         lo_q = minimum(q, lo_q);
         hi_q = maximum(q, hi_q);
     }
-    const FloatBlock farthest = maximum(maximum(-lo_p, hi_p), maximum(-lo_q, hi_q));
-    const FloatBlock slack = (32 * FLOAT_ROUNDOFF) * (farthest + sum);
+    const Real farthest = maximum(maximum(-lo_p, hi_p), maximum(-lo_q, hi_q));
+    const Real slack = (32 * FLOAT_ROUNDOFF) * (farthest + sum);
     const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
                        SMALLEST_DEPTH;
-    const FloatBlock middle_p = select(ahead, 0.5f * (lo_p + hi_p), FloatBlock(0.0f));
-    const FloatBlock middle_q = select(ahead, 0.5f * (lo_q + hi_q), FloatBlock(0.0f));
-    const FloatBlock extent_p =
-        select(ahead, 0.5f * (hi_p - lo_p) + slack, FloatBlock(INFINITE));
-    const FloatBlock extent_q =
-        select(ahead, 0.5f * (hi_q - lo_q) + slack, FloatBlock(INFINITE));
+    const Real middle_p = select(ahead, 0.5f * (lo_p + hi_p), Real(0.0f));
+    const Real middle_q = select(ahead, 0.5f * (lo_q + hi_q), Real(0.0f));
+    const Real extent_p = select(ahead, 0.5f * (hi_p - lo_p) + slack, Real(INFINITE));
+    const Real extent_q = select(ahead, 0.5f * (hi_q - lo_q) + slack, Real(INFINITE));
     inside &= (absolute(middle_p) <= extent_p + half_p) &
               (absolute(middle_q) <= extent_q + half_q);
     possible = to_bits(inside) & safe_bits;
@@ -131,14 +130,14 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     store(box_half_p, extent_p);
     store(box_half_q, extent_q);
 
-    FloatBlock greatest;
+    Real greatest;
     for (int form = 0; form < 4; ++form) {
-        const FloatBlock form_u = normals[form].x * inverse;
-        const FloatBlock form_v = normals[form].y * inverse;
-        const FloatBlock form_1 = normals[form].z * (inverse * beam.side);
-        const FloatBlock middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
-        const FloatBlock form_p = fused(form_u, cosine, form_v * sine);
-        const FloatBlock form_q = fused(form_v, cosine, -(form_u * sine));
+        const Real form_u = normals[form].x * inverse;
+        const Real form_v = normals[form].y * inverse;
+        const Real form_1 = normals[form].z * (inverse * beam.side);
+        const Real middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
+        const Real form_p = fused(form_u, cosine, form_v * sine);
+        const Real form_q = fused(form_v, cosine, -(form_u * sine));
         greatest = middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
         if (form != DEPTH)
             inside &= greatest >= -edge_bound;
@@ -152,13 +151,21 @@ void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *tr
     // With the exact value y and the computed one x = y (1 + r) + f, |r| <= share <= 1/4
     // and |f| <= depth_bound: y is at most (x + f) (1 + 2 share) and at least (x - f) (1 -
     // share), for x of either sign as far as y is positive.
-    const FloatBlock grow = 1.0f + 2.0f * share, shrink = 1.0f - 2.0f * share;
-    const FloatBlock error = 2.0f * depth_bound;
+    const Real grow = 1.0f + 2.0f * share, shrink = 1.0f - 2.0f * share;
+    const Real error = 2.0f * depth_bound;
     store(depth_grow, grow * (1 + 4 * FLOAT_ROUNDOFF));
     store(depth_shrink, shrink * (1 - 4 * FLOAT_ROUNDOFF));
     store(depth_error, error);
     inside &= fused(greatest, grow * (1 + 4 * FLOAT_ROUNDOFF), error) >= least;
     possible = to_bits(inside) & safe_bits;
+}
+
+void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
+                        const uint32_t *numbers, uint32_t count) {
+    if (count <= BLOCK_WIDTH)
+        set_block<FloatBlock>(beam, least, triangles, numbers, count);
+    else
+        set_block<FloatWide>(beam, least, triangles, numbers, count);
 }
 
 } // namespace mlrt

@@ -1,4 +1,5 @@
-// Eight triangles as a beam sees them: linear forms in the slopes of its rays.
+// Triangles as a beam sees them, a register of them side by side: linear forms in the
+// slopes of its rays.
 //
 // Of a triangle (a, b, c) relative to the common origin and a ray of direction
 // d = |d_k| (u, v, side), the volumes U, V, W of geometry/triangle_test.h are
@@ -19,7 +20,7 @@
 namespace mlrt {
 
 struct alignas(64) TriangleForms {
-    static constexpr uint32_t CAPACITY = BLOCK_WIDTH;
+    static constexpr uint32_t CAPACITY = WIDE_WIDTH;
     static constexpr int DEPTH = 3; // after the three edges
     using Lanes = float[CAPACITY];
 
@@ -42,10 +43,15 @@ struct alignas(64) TriangleForms {
     // those of which the forms say nothing.
     LaneBits possible = 0, unsafe = 0;
 
-    // Takes in up to eight triangles; `numbers` has eight entries, of which those behind
-    // the first `count` name any triangle.
+    // Takes in up to CAPACITY triangles; `numbers` has as many entries, of which those
+    // behind the first `count` name any triangle.
     void set(const BeamPackets &beam, float least, const Triangle *triangles,
              const uint32_t *numbers, uint32_t count);
+
+private:
+    template <typename Real>
+    void set_block(const BeamPackets &beam, float least, const Triangle *triangles,
+                   const uint32_t *numbers, uint32_t count);
 };
 
 } // namespace mlrt

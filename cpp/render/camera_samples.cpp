@@ -3,28 +3,62 @@
 #include "base/simd.h"
 
 #include <algorithm>
+#include <numbers>
 
 namespace mlrt {
 
+namespace {
+
+constexpr float PI = std::numbers::pi_v<float>;
+
+// A point of the unit disk, uniform if x and y are in [0, 1) (Shirley and Chiu 1997, "A low
+// distortion map between disk and square", in the form of Mitsuba's warp.h).
+Vec2<FloatPacket> on_disk(const FloatPacket &x, const FloatPacket &y) {
+    const FloatPacket zero(0.0f), two(2.0f), one(1.0f);
+    const FloatPacket a = fused(two, x, -one), b = fused(two, y, -one);
+    const auto steep = absolute(a) < absolute(b);
+    const FloatPacket r = select(steep, b, a), other = select(steep, a, b);
+    FloatPacket angle = FloatPacket(0.25f * PI) * other / r;
+    angle = select(steep, FloatPacket(0.5f * PI) - angle, angle);
+    angle = select((a == zero) & (b == zero), zero, angle);
+    return {r * cosine(angle), r * sine(angle)};
+}
+
+} // namespace
+
 CameraSamples::CameraSamples(const PreparedScene &scene, const SampleStreams &streams,
-                             const PixelRect &sampled, Wanted wanted)
-    : scene_(scene), streams_(streams), sampled_(sampled), wanted_(wanted) {}
+                             const Sampler &sampler, const PixelRect &sampled,
+                             Wanted wanted)
+    : scene_(scene), streams_(streams), sampler_(sampler), sampled_(sampled),
+      wanted_(wanted), light_x_(std::max(1u, wanted.light_samples)),
+      light_y_(light_x_.size()) {}
 
 void CameraSamples::generate(const PixelGroup &group) {
     count_ = group.ray_count();
     lay_out(group);
     choose_streams(group);
-    const bool lit = wanted_.light_numbers;
-    draw_numbers(seed_.data(), stream_.data(), padded_count(),
-                 {film_x_.data(), film_y_.data(), lit ? light_x_.data() : nullptr,
-                  lit ? light_y_.data() : nullptr});
+    draw();
+    make_rays(group);
+}
 
-    const CameraMap &camera = scene_.plane.single;
-    const Vec3<FloatPacket> base = in_all_lanes(camera.base);
-    const Vec3<FloatPacket> dx = in_all_lanes(camera.dx), dy = in_all_lanes(camera.dy);
+void CameraSamples::draw() {
+    if (sampler_.type == SamplerType::independent)
+        draw_numbers(seed_.data(), stream_.data(), padded_count(), pairs_);
+    else
+        draw_spread_numbers(sampler_, seed_.data(), stream_.data(), padded_count(),
+                            streams_.samples_per_pixel(), pairs_);
+}
+
+void CameraSamples::make_rays(const PixelGroup &group) {
+    const ImagePlane &plane = scene_.plane;
+    const Vec3<FloatPacket> base = in_all_lanes(plane.single.base);
+    const Vec3<FloatPacket> dx = in_all_lanes(plane.single.dx);
+    const Vec3<FloatPacket> dy = in_all_lanes(plane.single.dy);
     // Whole numbers of pixels, which floats hold exactly.
     const FloatPacket left(float(sampled_.x + int(group.left)));
     const FloatPacket top(float(sampled_.y + int(group.top)));
+    std::vector<float> *mapped =
+        plane.type == CameraType::orthographic ? origin_ : direction_;
     for (size_t i = 0; i < padded_count(); i += PACKET_WIDTH) {
         const FloatPacket x =
             load<FloatPacket>(&film_x_[i]) + (left + load<FloatPacket>(&column_[i]));
@@ -36,7 +70,25 @@ void CameraSamples::generate(const PixelGroup &group) {
         }
         const Vec3<FloatPacket> d = (base + x * dx) + y * dy;
         for (int k = 0; k < 3; ++k)
-            store(&direction_[k][i], d[k]);
+            store(&mapped[k][i], d[k]);
+    }
+    if (plane.type == CameraType::thinlens)
+        refract();
+}
+
+// Rays through the middle of the lens become rays through points of it.
+void CameraSamples::refract() {
+    const ImagePlane &plane = scene_.plane;
+    for (size_t i = 0; i < padded_count(); i += PACKET_WIDTH) {
+        const auto [u, v] =
+            on_disk(load<FloatPacket>(&lens_u_[i]), load<FloatPacket>(&lens_v_[i]));
+        for (int k = 0; k < 3; ++k) {
+            const FloatPacket offset =
+                u * FloatPacket(plane.lens_x[k]) + v * FloatPacket(plane.lens_y[k]);
+            store(&origin_[k][i], FloatPacket(plane.origin[k]) + offset);
+            store(&direction_[k][i], load<FloatPacket>(&direction_[k][i]) -
+                                         offset * FloatPacket(plane.inverse_focus));
+        }
     }
 }
 
@@ -46,10 +98,16 @@ void CameraSamples::lay_out(const PixelGroup &group) {
     side_ = group.side;
     sample_count_ = group.sample_count;
     const size_t padded = (count_ + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
-    for (std::vector<float> *array :
-         {&column_, &row_, &film_x_, &film_y_, &light_x_, &light_y_, &direction_[0],
-          &direction_[1], &direction_[2]})
+    for (std::vector<float> *array : {&column_, &row_, &film_x_, &film_y_, &direction_[0],
+                                      &direction_[1], &direction_[2]})
         array->resize(padded);
+    make_room_for_numbers(padded);
+    if (!scene_.plane.has_common_origin())
+        for (std::vector<float> &array : origin_)
+            array.resize(padded);
+    if (scene_.plane.type == CameraType::orthographic)
+        for (int k = 0; k < 3; ++k)
+            std::fill(direction_[k].begin(), direction_[k].end(), scene_.plane.parallel[k]);
     for (std::vector<uint32_t> *array : {&first_stream_, &seed_, &stream_})
         array->resize(padded);
     t_min_.assign(padded, scene_.plane.near_clip);
@@ -64,6 +122,25 @@ void CameraSamples::lay_out(const PixelGroup &group) {
             uint32_t(last % sample_count_);
     }
     std::fill(seed_.begin(), seed_.end(), streams_.stream(0, 0).seed);
+}
+
+// Mitsuba's integrator.cpp, render_sample: where in the pixel, where on the lens, when, and
+// then what the lights take.
+void CameraSamples::make_room_for_numbers(size_t padded) {
+    pairs_.assign(1, NumberPair{film_x_.data(), film_y_.data()});
+    if (scene_.plane.type == CameraType::thinlens) {
+        lens_u_.resize(padded);
+        lens_v_.resize(padded);
+        pairs_.push_back({lens_u_.data(), lens_v_.data()});
+    }
+    if (scene_.data.camera.samples_time)
+        pairs_.push_back({});
+    for (size_t sample = 0; sample < light_x_.size(); ++sample) {
+        light_x_[sample].resize(padded);
+        light_y_[sample].resize(padded);
+        if (sample < wanted_.light_samples)
+            pairs_.push_back({light_x_[sample].data(), light_y_[sample].data()});
+    }
 }
 
 void CameraSamples::choose_streams(const PixelGroup &group) {

@@ -5,6 +5,7 @@
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
 #include "render/sampler.h"
+#include "render/spread_samples.h"
 
 #include <cstdint>
 #include <vector>
@@ -13,13 +14,15 @@ namespace mlrt {
 
 class CameraSamples {
 public:
-    // Which numbers are wanted besides those that make the rays.
+    // What is wanted besides the rays: positions on the film, and for how many samples of
+    // lights numbers.
     struct Wanted {
-        bool film_positions = false, light_numbers = false;
+        bool film_positions = false;
+        uint32_t light_samples = 0;
     };
 
     CameraSamples(const PreparedScene &scene, const SampleStreams &streams,
-                  const PixelRect &sampled, Wanted wanted);
+                  const Sampler &sampler, const PixelRect &sampled, Wanted wanted);
 
     void generate(const PixelGroup &group);
 
@@ -28,20 +31,28 @@ public:
     size_t count() const { return count_; }
     size_t padded_count() const { return t_min_.size(); }
     const float *direction(int axis) const { return direction_[axis].data(); }
+    // Where rays begin, if they do not all begin at the camera's origin.
+    const float *origin(int axis) const { return origin_[axis].data(); }
     const float *t_min() const { return t_min_.data(); }
     const float *t_max() const { return t_max_.data(); }
-    // Positions on the film, and numbers in [0, 1): any value if they are not wanted.
+    // Positions on the film: any value if they are not wanted.
     const float *film_x() const { return film_x_.data(); }
     const float *film_y() const { return film_y_.data(); }
-    const float *light_x() const { return light_x_.data(); }
-    const float *light_y() const { return light_y_.data(); }
+    // Numbers in [0, 1) of a sample of lights that is wanted; zeros if none is.
+    const float *light_x(uint32_t sample) const { return light_x_[sample].data(); }
+    const float *light_y(uint32_t sample) const { return light_y_[sample].data(); }
 
 private:
     void lay_out(const PixelGroup &group);
     void choose_streams(const PixelGroup &group);
+    void draw();
+    void make_rays(const PixelGroup &group);
+    void refract();
+    void make_room_for_numbers(size_t padded);
 
     const PreparedScene &scene_;
     const SampleStreams &streams_;
+    Sampler sampler_;
     PixelRect sampled_;
     Wanted wanted_;
     size_t count_ = 0;
@@ -53,8 +64,10 @@ private:
     std::vector<uint32_t> first_stream_;
 
     std::vector<uint32_t> seed_, stream_;
-    std::vector<float> film_x_, film_y_, light_x_, light_y_;
-    std::vector<float> direction_[3], t_min_, t_max_;
+    std::vector<float> film_x_, film_y_, lens_u_, lens_v_;
+    std::vector<std::vector<float>> light_x_, light_y_;
+    std::vector<NumberPair> pairs_; // in the order in which they are drawn
+    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
 };
 
 } // namespace mlrt

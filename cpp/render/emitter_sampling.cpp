@@ -116,6 +116,26 @@ float spot_falloff(const Emitter &emitter, const EmitterTable &table, float cosi
     return first_lane(spot_falloff(emitter, table, FloatPacket(cosine)));
 }
 
+// Mitsuba's constant.cpp and envmap.cpp, sample_direction.
+Environment::Samples sample_environment(const PreparedScene &scene, const FloatPacket &x,
+                                        const FloatPacket &y) {
+    return scene.environment.sample(x, y);
+}
+struct OneEnvironmentSample {
+    Vec3f direction, weight;
+};
+OneEnvironmentSample sample_environment(const PreparedScene &scene, float x, float y) {
+    const auto [d, w] = scene.environment.sample(FloatPacket(x), FloatPacket(y));
+    return {{first_lane(d.x), first_lane(d.y), first_lane(d.z)},
+            {first_lane(w.x), first_lane(w.y), first_lane(w.z)}};
+}
+
+// A distance that leads out of the scene, wherever p is.
+template <typename Real>
+Real way_out(const PreparedScene &scene, const Vec3<Real> &p) {
+    return Real(2.0f) * maximum(Real(scene.radius), length(p - spread<Real>(scene.center)));
+}
+
 // Light of one emitter; choice_weight is 1 / the probability that it was chosen.
 template <typename Real>
 EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
@@ -146,13 +166,19 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         break;
     }
     case EmitterType::directional: {
-        // Far enough away to lie outside of the scene (Mitsuba's directional.cpp).
-        const Real distance = Real(2.0f) * maximum(Real(scene.radius),
-                                                   length(p - spread<Real>(scene.center)));
-        sample.target = p - distance * spread<Real>(emitter.direction);
+        // Mitsuba's directional.cpp.
+        sample.target = p - way_out(scene, p) * spread<Real>(emitter.direction);
         sample.direction = spread<Real>(-emitter.direction);
         factor = choice_weight;
         break;
+    }
+    case EmitterType::constant:
+    case EmitterType::envmap: {
+        const auto [direction, weight] = sample_environment(scene, x, y);
+        sample.direction = direction;
+        sample.target = p + way_out(scene, p) * direction;
+        sample.weight = choice_weight * weight;
+        return sample;
     }
     case EmitterType::area: {
         if (!(table.inverse_area > 0))
@@ -227,7 +253,7 @@ bool needs_light_numbers(const PreparedScene &scene) {
     const std::vector<Emitter> &emitters = scene.data.emitters;
     return emitters.size() > 1 ||
            std::any_of(emitters.begin(), emitters.end(), [](const Emitter &emitter) {
-               return emitter.type == EmitterType::area;
+               return emitter.type == EmitterType::area || is_environment(emitter.type);
            });
 }
 

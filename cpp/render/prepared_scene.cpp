@@ -77,7 +77,8 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
 } // namespace
 
 PreparedScene::PreparedScene(SceneData scene_data)
-    : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)) {
+    : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
+      environment(data) {
     shape_of_face.resize(data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];

@@ -3,6 +3,7 @@
 
 #include "render/camera.h"
 #include "render/distribution.h"
+#include "render/environment.h"
 #include "render/scene.h"
 
 #include <cstdint>
@@ -30,7 +31,8 @@ struct PreparedScene {
     bool any_shape_glows = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
-    Vec3f center{};                           // of a sphere around all triangles
+    Environment environment;
+    Vec3f center{}; // of a sphere around all triangles
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);

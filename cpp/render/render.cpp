@@ -67,8 +67,9 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     const auto take_tile = [&]() -> std::unique_ptr<TileRenderer> {
         const std::lock_guard lock(tiles_mutex);
         if (idle_tiles.empty())
-            return std::make_unique<TileRenderer>(scene, streams, settings.trace,
-                                                  settings.shadow_offset, target);
+            return std::make_unique<TileRenderer>(scene, streams, settings.sampling,
+                                                  settings.trace, settings.shadow_offset,
+                                                  target);
         std::unique_ptr<TileRenderer> tile = std::move(idle_tiles.back());
         idle_tiles.pop_back();
         return tile;

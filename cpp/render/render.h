@@ -14,6 +14,7 @@ namespace mlrt {
 struct RenderSettings {
     uint32_t samples_per_pixel = 1;
     uint32_t seed = 0;
+    Sampling sampling;
     TraceOptions trace;
     ShadowOffset shadow_offset = ShadowOffset::mitsuba;
     AovSet aovs;
@@ -31,8 +32,8 @@ struct RenderResult {
 
 // Depth and normal are filtered as the colours are, as in Mitsuba's `aov` integrator.
 //
-// The result, but for the cost, depends, bit for bit, on the scene, the number of samples,
-// the seed and the offset of shadow rays only.
+// The result, but for the cost, depends, bit for bit, on the scene, the samples, the seed
+// and the offset of shadow rays only.
 //
 // `cancelled`, if given, is asked now and then by the calling thread, with the share of the
 // work that is done; once it returns true the function returns false and the result is of

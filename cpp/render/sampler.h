@@ -6,15 +6,17 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 
 namespace mlrt {
 
-// Four rounds of the Tiny Encryption Algorithm as a hash of two words (Zafar, Olano and
+// Rounds of the Tiny Encryption Algorithm as a hash of two words (Zafar, Olano and
 // Curtis 2010, "GPU random numbers via the Tiny Encryption Algorithm", listing 1).
-inline std::pair<uint32_t, uint32_t> sample_tea_32(uint32_t v0, uint32_t v1) {
+inline std::pair<uint32_t, uint32_t> sample_tea_32(uint32_t v0, uint32_t v1,
+                                                   int rounds = 4) {
     uint32_t sum = 0;
-    for (int round = 0; round < 4; ++round) {
+    for (int round = 0; round < rounds; ++round) {
         sum += 0x9e3779b9u;
         v0 += ((v1 << 4) + 0xa341316cu) ^ (v1 + sum) ^ ((v1 >> 5) + 0xc8013ea4u);
         v1 += ((v0 << 4) + 0xad90777du) ^ (v0 + sum) ^ ((v0 >> 5) + 0x7e95761eu);
@@ -109,33 +111,50 @@ private:
     uint32_t samples_per_pixel_, samples_per_pass_;
 };
 
-// What a sample takes from its stream: where in its pixel it lies, then which point of
-// which light it takes.
-struct SampleNumbers {
-    float *pixel_x, *pixel_y;
-    float *light_x = nullptr, *light_y = nullptr; // drawn if they are given
+// Where two numbers in [0, 1) of each sample go; nowhere if x is null: what is drawn is one
+// number then, and dropped.
+struct NumberPair {
+    float *x = nullptr, *y = nullptr;
 };
 
-// The loops have no branches, so compilers make vector code of them.
+// The numbers of samples, pair by pair. The loops for one and for two pairs have no
+// branches, so compilers make vector code of them.
 inline void draw_numbers(const uint32_t *__restrict seeds,
                          const uint32_t *__restrict indices, size_t count,
-                         SampleNumbers numbers) {
-    float *__restrict pixel_x = numbers.pixel_x, *__restrict pixel_y = numbers.pixel_y;
-    float *__restrict light_x = numbers.light_x, *__restrict light_y = numbers.light_y;
-    if (!light_x) {
+                         std::span<const NumberPair> pairs) {
+    const auto open = [&](size_t i) {
+        return SampleStreams::Stream{seeds[i], indices[i]}.open();
+    };
+    if (pairs.size() == 1) {
+        float *__restrict x = pairs[0].x, *__restrict y = pairs[0].y;
         for (size_t i = 0; i < count; ++i) {
-            Pcg32 random = SampleStreams::Stream{seeds[i], indices[i]}.open();
-            pixel_x[i] = random.next_float();
-            pixel_y[i] = random.next_float();
+            Pcg32 random = open(i);
+            x[i] = random.next_float();
+            y[i] = random.next_float();
+        }
+        return;
+    }
+    if (pairs.size() == 2 && pairs[1].x) {
+        float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
+        float *__restrict x1 = pairs[1].x, *__restrict y1 = pairs[1].y;
+        for (size_t i = 0; i < count; ++i) {
+            Pcg32 random = open(i);
+            x0[i] = random.next_float();
+            y0[i] = random.next_float();
+            x1[i] = random.next_float();
+            y1[i] = random.next_float();
         }
         return;
     }
     for (size_t i = 0; i < count; ++i) {
-        Pcg32 random = SampleStreams::Stream{seeds[i], indices[i]}.open();
-        pixel_x[i] = random.next_float();
-        pixel_y[i] = random.next_float();
-        light_x[i] = random.next_float();
-        light_y[i] = random.next_float();
+        Pcg32 random = open(i);
+        for (const NumberPair &pair : pairs) {
+            const float first = random.next_float();
+            if (!pair.x)
+                continue;
+            pair.x[i] = first;
+            pair.y[i] = random.next_float();
+        }
     }
 }
 

@@ -31,12 +31,18 @@ struct Material {
     Vec3f back{};
 };
 
-enum class EmitterType : uint32_t { point, spot, directional, area };
+enum class EmitterType : uint32_t { point, spot, directional, area, constant, envmap };
+
+// Whether the light comes from all around the scene; one emitter at most does.
+constexpr bool is_environment(EmitterType type) {
+    return type == EmitterType::constant || type == EmitterType::envmap;
+}
 
 // Light sources in the order of their declaration, which emitter sampling depends on.
 struct Emitter {
     EmitterType type = EmitterType::point;
-    Vec3f radiance{}; // intensity (point, spot), irradiance (directional), radiance (area)
+    Vec3f radiance{}; // intensity (point, spot), irradiance (directional), radiance (area,
+                      // constant), factor of the picture (envmap)
     Vec3f position{}; // point, spot: world space
     Vec3f direction{0, 0,
                     1}; // spot: axis; directional: the way light travels; unit, world space
@@ -45,15 +51,32 @@ struct Emitter {
     uint32_t shape = NONE;  // area: the glowing shape
     bool rectangle = false; // area: `rectangle` samples uniformly in its (u, v)
     Vec3f corner{}, edge_u{}, edge_v{}; // rectangle: p = corner + u * edge_u + v * edge_v
-    float sampling_weight = 1;          // relative probability of being chosen
+    std::array<Vec3f, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // envmap: in world space
+    float sampling_weight = 1; // relative probability of being chosen
 };
 
-// A pinhole camera (Mitsuba's `perspective`): looks along +z of its frame, x points left.
+// Radiance in latitude and longitude. The first row lies at the pole that the emitter's y
+// axis points to.
+struct EnvironmentPicture {
+    uint32_t width = 0, height = 0; // at least 2 and 3; 0 if there is none
+    std::vector<float> rgb;         // row by row
+};
+
+enum class CameraType : uint32_t { perspective, thinlens, orthographic };
+
+// A camera looks along +z of its frame, x points left.
 struct Camera {
+    CameraType type = CameraType::perspective;
     Vec3f origin{}; // world space
     std::array<Vec3f, 3> axes{
-        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};   // camera x, y, z in world space
-    float tan_half_fov_x = 1;                 // of the whole film, crop not considered
+        {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // camera x, y, z in world space
+    float tan_half_fov_x = 1; // of the whole film, crop not considered; not orthographic
+    // orthographic: half the width of the film, and what would be half its height if it
+    // were square, in scene units
+    Vec2f half_extent{1, 1};
+    float aperture_radius = 0; // thinlens: scene units
+    float focus_distance = 1;  // thinlens: along the camera's z
+    bool samples_time = false; // whether a number of each sample is spent on its time
     float near_clip = 0.01f, far_clip = 1e4f; // distances along the camera's z
     Vec2f principal_point_offset{};           // in fractions of the film
 };
@@ -78,6 +101,7 @@ struct SceneData {
     std::vector<Shape> shapes;  // ordered by first_face, covering all faces
     std::vector<Material> materials;
     std::vector<Emitter> emitters;
+    EnvironmentPicture environment; // of the emitter that is an envmap
     Camera camera;
     Film film;
     bool hide_emitters = false;

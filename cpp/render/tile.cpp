@@ -48,11 +48,15 @@ Vec3<FloatPacket> albedo_of(const PreparedScene &scene, const UIntPacket &shapes
 } // namespace
 
 TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                           const TraceOptions &options, ShadowOffset offset,
-                           TileTarget target)
-    : scene_(scene), streams_(streams), options_(options), offset_(offset), target_(target),
-      samples_(scene, streams, target.film.sampled(),
-               {target.film.needs_positions(), needs_light_numbers(scene)}) {
+                           const Sampling &sampling, const TraceOptions &options,
+                           ShadowOffset offset, TileTarget target)
+    : scene_(scene), streams_(streams),
+      // One is as good as many where the numbers make no difference.
+      emitter_samples_(needs_light_numbers(scene) ? sampling.emitter_samples : 1),
+      options_(options), offset_(offset), target_(target),
+      samples_(scene, streams, sampling.sampler, target.film.sampled(),
+               {target.film.needs_positions(),
+                needs_light_numbers(scene) ? sampling.emitter_samples : 0}) {
     for (uint32_t emitter = 0; emitter < scene.data.emitters.size(); ++emitter)
         shadows_.emplace_back(scene, emitter, offset);
 }
@@ -61,6 +65,8 @@ void TileRenderer::render(const PixelGroup &group) {
     samples_.generate(group);
     make_room();
     trace_camera_rays(group);
+    if (scene_.environment.exists() && !scene_.data.hide_emitters)
+        add_background();
     shade_hits();
     pass_hidden_emitters();
     add_reflected_light();
@@ -85,10 +91,12 @@ void TileRenderer::make_room() {
 void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     RayGroup rays;
     rays.count = uint32_t(samples_.count());
-    rays.has_common_origin = true;
+    rays.has_common_origin = scene_.plane.has_common_origin();
     rays.common_origin = scene_.plane.origin;
-    for (int k = 0; k < 3; ++k)
+    for (int k = 0; k < 3; ++k) {
+        rays.origin[k] = samples_.origin(k);
         rays.direction[k] = samples_.direction(k);
+    }
     rays.t_min = samples_.t_min();
     rays.t_max = samples_.t_max();
     rays.cost = target_.cost ? cost_.data() : nullptr;
@@ -101,11 +109,28 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     tile.y = uint32_t(y);
     tile.size = group.side;
     tile.samples = group.sample_count;
-    const bool is_square = group.side > 0 && x >= 0 && y >= 0;
+    const bool is_square = rays.has_common_origin && group.side > 0 && x >= 0 && y >= 0;
     const bool wants_distances = target_.channels.depth >= 0;
     trace_closest(*scene_.data.tree, rays, options_,
                   HitGroup{wants_distances ? t_.data() : nullptr, primitive_.data()},
                   counters_.primary, is_square ? &tile : nullptr);
+}
+
+// What rays see that meet nothing.
+void TileRenderer::add_background() {
+    for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
+        const LaneBits misses =
+            to_bits(load<UIntPacket>(&primitive_[first]) == UIntPacket(NO_PRIMITIVE));
+        if (misses == 0)
+            continue;
+        const auto mask = from_bits<FloatPacket>(misses);
+        const Vec3<FloatPacket> light =
+            scene_.environment.radiance({load<FloatPacket>(samples_.direction(0) + first),
+                                         load<FloatPacket>(samples_.direction(1) + first),
+                                         load<FloatPacket>(samples_.direction(2) + first)});
+        for (int k = 0; k < 3; ++k)
+            store(&values_[size_t(k)][first], select(mask, light[k], FloatPacket(0.0f)));
+    }
 }
 
 void TileRenderer::shade_hits() {
@@ -120,13 +145,21 @@ void TileRenderer::shade_hits() {
         hit.ray = UIntPacket(uint32_t(first)) + lane_number;
         for (int k = 0; k < 3; ++k)
             hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
-        hit.light_x = load<FloatPacket>(samples_.light_x() + first);
-        hit.light_y = load<FloatPacket>(samples_.light_y() + first);
-        const SurfacePoint<FloatPacket> point =
-            hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces, hit.lanes);
+        hit.first = first;
+        const SurfacePoint<FloatPacket> point = surfaces_of(hit);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
+}
+
+// The surfaces that camera rays hit, whose origins are filled in if they are not common.
+SurfacePoint<FloatPacket> TileRenderer::surfaces_of(HitPacket &hit) const {
+    if (scene_.plane.has_common_origin())
+        return hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces,
+                            hit.lanes);
+    for (int k = 0; k < 3; ++k)
+        hit.origin[k] = load<FloatPacket>(samples_.origin(k) + *hit.first);
+    return hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes);
 }
 
 void TileRenderer::write_depth_and_normal(const HitPacket &hit,
@@ -146,9 +179,9 @@ void TileRenderer::write_depth_and_normal(const HitPacket &hit,
         set(channels.normal + k, point.shading_normal[k]);
 }
 
-// Mitsuba's direct.cpp with one emitter sample and no BSDF sample: light that the surface
-// emits, and shadow rays for light that it reflects. A ray that contributes nothing,
-// however its shadow ray fares, is left out as soon as that is known.
+// Mitsuba's direct.cpp without BSDF samples: light that the surface emits, and shadow rays
+// for light that it reflects. A ray that contributes nothing, however its shadow ray fares,
+// is left out as soon as that is known.
 void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point) {
     const FloatPacket zero(0.0f);
     // Only its sign matters, so the direction need not have unit length.
@@ -162,10 +195,25 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
     lanes &= not_black(albedo);
     if (lanes == 0 || shadows_.empty())
         return;
-    const EmitterChoices choices = choose_emitters(scene_, hit.light_x);
+    for (uint32_t sample = 0; sample < emitter_samples_; ++sample)
+        add_emitter_sample(hit, point, lanes, cos_view, albedo, sample);
+}
+
+void TileRenderer::add_emitter_sample(const HitPacket &hit,
+                                      const SurfacePoint<FloatPacket> &point,
+                                      LaneBits lanes, const FloatPacket &cos_view,
+                                      const Vec3<FloatPacket> &albedo, uint32_t sample) {
+    const auto numbers = [&](const float *of_rays) {
+        return hit.first ? load<FloatPacket>(of_rays + *hit.first)
+                         : gather(of_rays, hit.ray);
+    };
+    const FloatPacket zero(0.0f), x = numbers(samples_.light_x(sample));
+    const FloatPacket y = numbers(samples_.light_y(sample));
+    const float part = std::numbers::inv_pi_v<float> / float(emitter_samples_);
+    const EmitterChoices choices = choose_emitters(scene_, x);
     for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits lit) {
         const EmitterSample<FloatPacket> light =
-            sample_chosen(scene_, emitter, choices, point.p, hit.light_y);
+            sample_chosen(scene_, emitter, choices, point.p, y);
         const FloatPacket cosine = dot(light.direction, point.shading_normal);
         const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
         lit &= not_black(light.weight) & to_bits(cos_light > zero);
@@ -180,7 +228,7 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
             segment = {offset_point(point.p, point.face_normal, light.target - point.p),
                        light.target};
         }
-        const FloatPacket share = FloatPacket(std::numbers::inv_pi_v<float>) * cos_light;
+        const FloatPacket share = FloatPacket(part) * cos_light;
         shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
                                  (albedo * share) * light.weight);
     });
@@ -258,7 +306,7 @@ void TileRenderer::shade_passed(const PassingRays &passing,
                                 const std::vector<uint32_t> &primitive, size_t first) {
     HitPacket hit;
     LaneArray<uint32_t> rays, faces;
-    LaneArray<float> origin[3], d[3], light_x, light_y;
+    LaneArray<float> origin[3], d[3];
     // Lanes behind the last ray repeat it.
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
         const size_t i = std::min(first + lane, passing.ray.size() - 1);
@@ -271,8 +319,6 @@ void TileRenderer::shade_passed(const PassingRays &passing,
             origin[k][lane] = passing.origin[k][i];
             d[k][lane] = samples_.direction(k)[ray];
         }
-        light_x[lane] = samples_.light_x()[ray];
-        light_y[lane] = samples_.light_y()[ray];
     }
     if (hit.lanes == 0)
         return;
@@ -282,8 +328,6 @@ void TileRenderer::shade_passed(const PassingRays &passing,
     }
     hit.ray = load<UIntPacket>(rays);
     hit.faces = load<UIntPacket>(faces);
-    hit.light_x = load<FloatPacket>(light_x);
-    hit.light_y = load<FloatPacket>(light_y);
     shade(hit, hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes));
 }
 

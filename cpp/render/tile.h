@@ -12,9 +12,11 @@
 #include "render/sampler.h"
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
+#include "render/spread_samples.h"
 #include "render/surface.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -54,10 +56,17 @@ struct RenderCounters {
     Counters primary, shadow;
 };
 
+// How samples are taken.
+struct Sampling {
+    Sampler sampler;
+    uint32_t emitter_samples = 1; // of each camera sample
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const TraceOptions &options, ShadowOffset offset, TileTarget target);
+                 const Sampling &sampling, const TraceOptions &options, ShadowOffset offset,
+                 TileTarget target);
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
 
@@ -70,9 +79,9 @@ private:
     // Up to sixteen rays that meet a surface.
     struct HitPacket {
         LaneBits lanes = 0;
+        std::optional<size_t> first; // ray in lane 0, if the others follow it
         UIntPacket ray, faces;
         Vec3<FloatPacket> origin, direction;
-        FloatPacket light_x, light_y;
     };
 
     // Camera rays that go on behind an emitter that is to be hidden.
@@ -83,10 +92,15 @@ private:
 
     void make_room();
     void trace_camera_rays(const PixelGroup &group);
+    void add_background();
     void shade_hits();
+    SurfacePoint<FloatPacket> surfaces_of(HitPacket &hit) const;
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
+    void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                            LaneBits lanes, const FloatPacket &cos_view,
+                            const Vec3<FloatPacket> &albedo, uint32_t sample);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
     void pass_hidden_emitters();
@@ -97,6 +111,7 @@ private:
 
     const PreparedScene &scene_;
     const SampleStreams &streams_;
+    uint32_t emitter_samples_;
     TraceOptions options_;
     ShadowOffset offset_;
     TileTarget target_;

@@ -16,7 +16,7 @@ namespace {
 
 // One ray against eight triangles: those that it may hit.
 LaneBits may_hit(const Vec3<FloatBlock> &origin, const Vec3<FloatBlock> &direction,
-                 const TriangleBlock &block) {
+                 const TriangleBlock<FloatBlock> &block) {
     const FilteredVolumes<FloatBlock> volumes(origin, direction, block.a, block.b, block.c);
     return ~volumes.certain_misses() & ((1u << BLOCK_WIDTH) - 1);
 }
@@ -47,7 +47,7 @@ void test_leaf(const KdTree &tree, const Ray &ray, KdNode leaf, Hit &best,
         numbers.fill(references[first]);
         std::copy_n(references.begin() + ptrdiff_t(first), count, numbers.begin());
         counters.triangle_tests += count;
-        const TriangleBlock block(tree.triangles.data(), numbers.data());
+        const TriangleBlock<FloatBlock> block(tree.triangles.data(), numbers.data());
         for_each_lane(may_hit(origin, direction, block) & ((1u << count) - 1),
                       [&](uint32_t lane) {
                           test_triangle(tree, ray, numbers[lane], best, counters);

@@ -11,6 +11,7 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
+from .. import mitsuba_objects as objects
 from ..errors import MlrtError, SceneError, one_sentence, warn_of
 from ..integrators import own_aovs
 from ..options import BUILD_OPTIONS, TRACE_OPTIONS
@@ -23,6 +24,7 @@ from ..render import (
     checked_spp,
     chosen_shadow_offset,
     own_spp,
+    rounded,
 )
 from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
@@ -169,11 +171,7 @@ class PreparedHybrid:
             image = as_depth(images["depth"])
             images = {name: images[name] for name in aovs}
         messages = list(self.warnings)
-        if samples != asked:
-            messages.append(
-                f"sampler '{sampler.class_name()}' takes {samples} samples a pixel in "
-                f"place of {asked}"
-            )
+        messages += rounded(objects.plugin_name(sampler), asked, samples)
         broken = int(np.count_nonzero(~np.isfinite(image).all(axis=2)))
         if broken:
             messages.append(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +17,6 @@ from mlrt_plugin.scene_import import import_scene, summarise
 SceneFile = Callable[..., Path]
 
 GLOWING = '<shape type="rectangle"><emitter type="area"/></shape>'
-MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,6 @@ MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
     [
         ({"integrator": '<integrator type="path"/>'}, "max_depth = -1"),
         ({"integrator": '<integrator type="volpath"/>'}, "participating media"),
-        ({"sensor": MULTIJITTER}, "sampler 'multijitter'"),
         (
             {"integrator": '<integrator type="direct"/>', "emitters": GLOWING},
             "BSDF samples",
@@ -34,7 +33,7 @@ MULTIJITTER = scene_files.SENSOR.replace("independent", "multijitter")
                 "integrator": '<integrator type="direct">'
                 '<integer name="emitter_samples" value="4"/></integrator>'
             },
-            "emitter_samples = 4",
+            "4 times.*here it counts once",
         ),
     ],
 )
@@ -42,12 +41,16 @@ def test_approximations_are_named(
     scene_file: SceneFile, parts: dict[str, str], named: str
 ) -> None:
     (warning,) = import_scene(scene_file(**parts), force_direct=True).warnings
-    assert named in warning
+    assert re.search(named, warning)
 
 
 UNSUPPORTED = {
     "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
-    "constant": {"emitters": '<emitter type="constant" id="sky"/>'},
+    "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
+    "envmap": {
+        "emitters": '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
+        '<boolean name="mis_compensation" value="true"/></emitter>'
+    },
     "bitmap": {
         "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
         '<texture type="bitmap" name="reflectance" id="wood">'
@@ -58,7 +61,18 @@ UNSUPPORTED = {
         "shapes": '<shape type="cube"><bsdf type="twosided"><bsdf type="plastic"/></bsdf>'
         "</shape>"
     },
-    "thinlens": {"sensor": scene_files.SENSOR.replace("perspective", "thinlens")},
+    "orthographic": {
+        "sensor": scene_files.SENSOR.replace("perspective", "orthographic").replace(
+            "</transform>", '<scale x="2"/><rotate z="1" angle="30"/></transform>'
+        )
+    },
+    "radiancemeter": {"sensor": scene_files.SENSOR.replace("perspective", "radiancemeter")},
+    "orthogonal": {
+        "sensor": scene_files.SENSOR.replace(
+            'type="independent">',
+            'type="orthogonal"><integer name="strength" value="3"/>',
+        )
+    },
     "mitchell": {
         "sensor": scene_files.SENSOR.replace(
             '<rfilter type="box"/>',

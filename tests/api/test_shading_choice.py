@@ -48,6 +48,10 @@ def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
             {"integrator": integrator("mlrt", "integer", "bsdf_samples", 2)},
             "integrator 'mlrt'.*no BSDF sample natively",
         ),
+        (
+            {"integrator": integrator("direct", "integer", "emitter_samples", 257)},
+            "emitter_samples = 257, and at most 256 are taken natively",
+        ),
         ({"shapes": SHINY + '<shape type="disk"/>'}, "'plastic'.*, and 1 more$"),
     ],
 )

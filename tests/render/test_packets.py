@@ -92,7 +92,9 @@ def test_weights_equal_those_of_the_queries() -> None:
         np.testing.assert_array_equal(weights[:, 1], bits(v[some]))
 
 
-@pytest.mark.parametrize("name", ["several", "spot", "mesh smooth", "mesh flat"])
+@pytest.mark.parametrize(
+    "name", ["several", "spot", "mesh smooth", "mesh flat", "constant", "sky"]
+)
 def test_lights(folder: Path, name: str) -> None:
     own = core_scene(render_scenes.SCENES[name](folder))
     random = np.random.default_rng(79)

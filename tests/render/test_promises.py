@@ -34,7 +34,9 @@ def all_pictures(answer: dict[str, Any]) -> bytes:
     )
 
 
-@pytest.mark.parametrize("name", ["several", "gaussian border", "crop"])
+@pytest.mark.parametrize(
+    "name", ["several", "gaussian border", "crop", "mirrored sky", "lens", "parallel"]
+)
 def test_picture_does_not_depend_on_threads(folder: Path, threads: None, name: str) -> None:
     scene = core_scene(render_scenes.SCENES[name](folder))
     pictures = set()
@@ -44,7 +46,9 @@ def test_picture_does_not_depend_on_threads(folder: Path, threads: None, name: s
     assert len(pictures) == 1
 
 
-@pytest.mark.parametrize("name", ["several", "gaussian border", "crop"])
+@pytest.mark.parametrize(
+    "name", ["several", "gaussian border", "crop", "mirrored sky", "lens", "parallel"]
+)
 def test_picture_does_not_depend_on_options(folder: Path, name: str) -> None:
     scene = core_scene(render_scenes.SCENES[name](folder))
     pictures = {}

@@ -1,6 +1,8 @@
-"""The stream of random numbers equals that of Mitsuba's `independent`, bit for bit."""
+"""Random numbers equal those of Mitsuba's samplers, bit for bit."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -48,6 +50,39 @@ def test_against_the_sampler_itself(
         "sampler", seed=seed, samples=samples, size=pixels * samples, dimensions=DIMENSIONS
     )
     np.testing.assert_array_equal(own_stream(seed, pixels, samples), expected)
+
+
+SPREAD: dict[str, dict[str, Any]] = {
+    "independent": {"sample_count": 3},
+    "stratified": {"sample_count": 9},
+    "stratified in the middle": {"sample_count": 4, "jitter": False},
+    "multijitter": {"sample_count": 12},
+    "multijitter of a prime": {"sample_count": 7},
+    "multijitter once": {"sample_count": 1, "jitter": False},
+    "orthogonal": {"sample_count": 25},
+    "orthogonal in the middle": {"sample_count": 9, "jitter": False},
+    "ldsampler": {"sample_count": 64},
+}
+
+
+@pytest.mark.parametrize("name", SPREAD)
+def test_pairs_of_all_samplers(mitsuba_llvm: MitsubaWorker, name: str) -> None:
+    """Bit for bit, with a seed of the sampler's own, and a number that nobody wants."""
+    pixels, seed, own_seed = 40, 11, 3
+    kind = name.split()[0]
+    plugin = {"type": kind, "seed": own_seed, **SPREAD[name]}
+    drawn = [2, 2, 1, 2, 2]
+    expected = mitsuba_llvm(
+        "sampler_pairs", plugin=plugin, seed=seed, pixels=pixels, drawn=drawn
+    )
+    samples = len(expected) // pixels
+    sampler = {"type": kind, "base_seed": own_seed, "jitter": plugin.get("jitter", True)}
+    spread = core.render_selftest.spread_sample
+    own = [
+        spread(sampler, seed + own_seed, samples, index, drawn)
+        for index in range(len(expected))
+    ]
+    np.testing.assert_array_equal(np.array(own, np.float32), expected)
 
 
 def test_first_pass_of_a_picture_beyond_32_bits() -> None:

@@ -38,6 +38,10 @@ def last_face_of_normals(arguments: Arguments) -> None:
     arguments["faces"][-1, 2] = 100_000
 
 
+def two_skies(arguments: Arguments) -> None:
+    arguments["emitters"][:2] = [{"type": "constant", "radiance": [1, 1, 1]}] * 2
+
+
 BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
     "missing key": (changed("camera.axes", KeyError), ValueError, r"camera lacks 'axes'"),
     "unknown key": (changed("film.widht", 3), ValueError, r"film has no field 'widht'"),
@@ -109,6 +113,45 @@ BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
         ValueError,
         r"\(M, 2, 3\)",
     ),
+    "no width": (changed("camera.half_extent", [0, 1]), ValueError, "'half_extent'"),
+    "unknown camera": (changed("camera.type", "fisheye"), ValueError, "perspective, thin"),
+    "lens without size": (
+        changed("camera.type", "thinlens"),
+        ValueError,
+        "camera lacks 'aperture_radius'",
+    ),
+    "negative lens": (
+        changed("camera.aperture_radius", -1),
+        ValueError,
+        "must not be negative",
+    ),
+    "no focus": (changed("camera.focus_distance", 0), ValueError, "'focus_distance'"),
+    "picture without a sky": (
+        changed("environment", np.zeros((3, 2, 3), np.float32)),
+        ValueError,
+        "if and only if",
+    ),
+    "sky without a picture": (
+        changed("emitters.0", {"type": "envmap", "radiance": [1, 1, 1]}),
+        ValueError,
+        "if and only if",
+    ),
+    "two skies": (two_skies, ValueError, "at most one"),
+    "flat sky": (
+        changed("emitters.0.axes", [[1, 0, 0], [0, 1, 0], [1, 1, 0]]),
+        ValueError,
+        "linearly independent",
+    ),
+    "picture shape": (
+        changed("environment", np.zeros((2, 2, 3), np.float32)),
+        ValueError,
+        r"\(H, W, 3\)",
+    ),
+    "picture of NaN": (
+        changed("environment", np.full((3, 2, 3), np.nan, np.float32)),
+        ValueError,
+        "finite",
+    ),
     "dark material": (
         changed("materials", np.full((6, 2, 3), -1, np.float32)),
         ValueError,
@@ -167,6 +210,18 @@ BAD_RENDERS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "split": ({"options": {"split_factor": 5}}, ValueError, "4 or 16"),
     "unknown picture": ({"aovs": ["albedo"]}, ValueError, "'albedo'"),
     "progress": ({"progress": 3}, TypeError, "callable"),
+    "unknown sampler": ({"sampler": {"type": "sobol"}}, ValueError, "independent, strat"),
+    "samples of a sampler": (
+        {"sampler": {"type": "stratified"}, "spp": 3},
+        ValueError,
+        "spp = 3",
+    ),
+    "too many samples": (
+        {"sampler": {"type": "ldsampler"}, "spp": 1 << 28},
+        ValueError,
+        "32 bits",
+    ),
+    "no emitter sample": ({"emitter_samples": 0}, ValueError, "from 1 to 256"),
 }
 
 

@@ -1,0 +1,168 @@
+#include "render/environment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mlrt {
+
+namespace {
+
+constexpr float PI = std::numbers::pi_v<float>;
+constexpr float INVERSE_PI = std::numbers::inv_pi_v<float>;
+constexpr float INVERSE_TWO_PI = 0.5f * INVERSE_PI;
+
+// Relative luminance of linear sRGB, as Mitsuba rounds its weights (ITU-R BT.709).
+float luminance(const float *rgb) {
+    return rgb[0] * 0.212671f + rgb[1] * 0.715160f + rgb[2] * 0.072169f;
+}
+
+std::array<Vec3f, 3> inverse_of(const std::array<Vec3f, 3> &columns) {
+    const Vec3d a(columns[0]), b(columns[1]), c(columns[2]);
+    // Rows of the inverse are the products of two columns over the determinant.
+    const double scale = 1 / dot(a, cross(b, c));
+    const Vec3d rows[3] = {cross(b, c) * scale, cross(c, a) * scale, cross(a, b) * scale};
+    std::array<Vec3f, 3> inverse;
+    for (int k = 0; k < 3; ++k)
+        inverse[k] = {float(rows[0][k]), float(rows[1][k]), float(rows[2][k])};
+    return inverse;
+}
+
+Vec3<FloatPacket> transform(const std::array<Vec3f, 3> &columns,
+                            const Vec3<FloatPacket> &v) {
+    Vec3<FloatPacket> result;
+    for (int k = 0; k < 3; ++k)
+        result[k] = fused(FloatPacket(columns[2][k]), v.z,
+                          fused(FloatPacket(columns[1][k]), v.y, columns[0][k] * v.x));
+    return result;
+}
+
+Vec3<FloatPacket> uniform_direction(const FloatPacket &x, const FloatPacket &y) {
+    const FloatPacket one(1.0f);
+    const FloatPacket z = fused(FloatPacket(-2.0f), y, one);
+    const FloatPacket r = square_root(maximum(fused(-z, z, one), FloatPacket(0.0f)));
+    const FloatPacket angle = FloatPacket(2 * PI) * x;
+    return {r * cosine(angle), r * sine(angle), z};
+}
+
+} // namespace
+
+Environment::Environment(const SceneData &scene) {
+    const auto found =
+        std::find_if(scene.emitters.begin(), scene.emitters.end(),
+                     [](const Emitter &e) { return is_environment(e.type); });
+    if (found == scene.emitters.end())
+        return;
+    exists_ = true;
+    radiance_ = found->radiance;
+    if (found->type == EmitterType::constant)
+        return;
+
+    const EnvironmentPicture &picture = scene.environment;
+    width_ = picture.width;
+    height_ = picture.height;
+    to_world_ = found->axes;
+    to_local_ = inverse_of(found->axes);
+    picture_.reserve(3 * size_t(width_ + 2) * height_);
+    for (uint32_t y = 0; y < height_; ++y) {
+        const auto row = picture.rgb.begin() + ptrdiff_t(3 * size_t(width_) * y);
+        const auto end = row + ptrdiff_t(3 * size_t(width_));
+        picture_.insert(picture_.end(), end - 3, end);
+        picture_.insert(picture_.end(), row, end);
+        picture_.insert(picture_.end(), row, row + 3);
+    }
+
+    // In proportion to the luminance and to the solid angle, which shrinks towards the
+    // poles; the first column once more at the end.
+    const uint32_t columns = width_ + 1;
+    std::vector<float> weights;
+    const float theta_scale = 1.0f / float(height_ - 1) * PI;
+    for (uint32_t y = 0; y < height_; ++y) {
+        const float sin_theta = std::sin(float(y) * theta_scale);
+        for (uint32_t x = 0; x < columns; ++x) {
+            const size_t pixel = size_t(y) * (width_ + 2) + x + 1;
+            const float light = luminance(&picture_[3 * pixel]);
+            weights.push_back(std::max(light, 0.0f) * sin_theta);
+        }
+    }
+    // The sine of single precision's pi is negative.
+    for (float &weight : weights)
+        weight = std::max(weight, 0.0f);
+    warp_ = BilinearWarp(columns, height_, weights);
+}
+
+// (u, v) is a direction's longitude and latitude: pixels have their places in the middle
+// of columns, but the first and the last row lie at the poles.
+Vec3<FloatPacket> Environment::look_up(const FloatPacket &u, const FloatPacket &v) const {
+    const FloatPacket zero(0.0f), one(1.0f), half(0.5f);
+    const float columns = float(width_ + 2), rows = float(height_);
+    const FloatPacket wrapped = u - floor(u);
+    const FloatPacket clipped = minimum(maximum(v, zero), one);
+    const FloatPacket across =
+        fused(wrapped, FloatPacket(float(width_)), one) / FloatPacket(columns);
+    const FloatPacket down =
+        fused(clipped, FloatPacket(rows - 1), half) / FloatPacket(rows);
+    // Within the picture, but for rounding; where it takes a place beyond an edge, the
+    // pixel there has no weight to speak of.
+    const auto place = [&](const FloatPacket &position, float size) {
+        const FloatPacket exact = fused(position, FloatPacket(size), -half);
+        return minimum(maximum(exact, zero), FloatPacket(size - 1));
+    };
+    const FloatPacket x = place(across, columns), y = place(down, rows);
+    const FloatPacket left = minimum(floor(x), FloatPacket(columns - 2));
+    const FloatPacket top = minimum(floor(y), FloatPacket(rows - 2));
+    const FloatPacket right_share = x - left, lower_share = y - top;
+    const FloatPacket left_share = one - right_share, upper_share = one - lower_share;
+
+    const UIntPacket corner =
+        (UIntPacket(left) + UIntPacket(top) * UIntPacket(width_ + 2)) * UIntPacket(3u);
+    const float *above = picture_.data(), *below = above + 3 * size_t(width_ + 2);
+    Vec3<FloatPacket> colour;
+    for (int k = 0; k < 3; ++k) {
+        const FloatPacket upper = fused(left_share, gather(above + k, corner),
+                                        right_share * gather(above + k + 3, corner));
+        const FloatPacket lower = fused(left_share, gather(below + k, corner),
+                                        right_share * gather(below + k + 3, corner));
+        colour[k] =
+            fused(upper_share, upper, lower_share * lower) * FloatPacket(radiance_[k]);
+    }
+    return colour;
+}
+
+Vec3<FloatPacket> Environment::radiance(const Vec3<FloatPacket> &direction) const {
+    if (width_ == 0)
+        return in_all_lanes(radiance_);
+    const Vec3<FloatPacket> d = transform(to_local_, normalize(direction));
+    const FloatPacket one(1.0f);
+    const FloatPacket height = minimum(maximum(d.y, -one), one);
+    return look_up(arc_tangent(d.x, -d.z) * FloatPacket(INVERSE_TWO_PI),
+                   arc_cosine(height) * FloatPacket(INVERSE_PI));
+}
+
+Environment::Samples Environment::sample(const FloatPacket &x, const FloatPacket &y) const {
+    const FloatPacket zero(0.0f);
+    if (width_ == 0)
+        return {uniform_direction(x, y), in_all_lanes(radiance_ * (4 * PI))};
+    if (warp_.empty())
+        return {in_all_lanes({0, 1, 0}), in_all_lanes({})};
+
+    const auto [point, density] = warp_.sample(x, y);
+    // The grid's columns begin in the middle of the first pixel.
+    const FloatPacket u = point.x + FloatPacket(0.5f / float(width_));
+    const FloatPacket theta = point.y * FloatPacket(PI), phi = u * FloatPacket(2 * PI);
+    const FloatPacket sin_theta = sine(theta);
+    const Vec3<FloatPacket> local = {sine(phi) * sin_theta, cosine(theta),
+                                     -cosine(phi) * sin_theta};
+    const FloatPacket inverse_sine =
+        FloatPacket(1.0f) / maximum(sin_theta, FloatPacket(0x1p-24f));
+    const FloatPacket per_solid_angle =
+        density * inverse_sine * FloatPacket(1.0f / (2 * (PI * PI)));
+    const Vec3<FloatPacket> light = look_up(u, point.y);
+    Samples samples;
+    samples.direction = transform(to_world_, local);
+    for (int k = 0; k < 3; ++k)
+        samples.weight[k] = select(density > zero, light[k] / per_solid_angle, zero);
+    return samples;
+}
+
+} // namespace mlrt
