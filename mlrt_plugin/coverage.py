@@ -63,6 +63,8 @@ REMARKS = {
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
+    ("integrator", "moment"): "by Mitsuba, around one `direct` or `path` with `max_depth` "
+    "2; else `--force-direct`",
     ("shape", "shapegroup"): "shading; of meshes alone it is in the tree",
     ("shape", "instance"): "shading; of meshes it is written out and in the tree",
     ("shape", "merge"): "shading; its meshes are in the tree",

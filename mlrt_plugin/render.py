@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .emitters import check_areas, check_distances
-from .errors import MlrtError, warn_of
+from .errors import MlrtError, SceneError, warn_of
 from .integrators import own_aovs
 from .options import (
     AOVS,
@@ -123,7 +123,13 @@ class PreparedScene:
         if build:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
-        asked = checked_spp(self.arrays.spp if spp is None else spp)
+        if "moment" in aovs:
+            raise MlrtError(
+                "aov 'moment' does not exist where shading is native: leave it out, or "
+                "choose shading = mitsuba"
+            )
+        name = next((str(f) for f in self.arrays.features if f.kind == "sampler"), "")
+        asked = own_spp(self.arrays.spp, name) if spp is None else checked_spp(spp)
         sampler, film = self.arrays.sampler, self.arrays.film
         samples = possible_spp(sampler, asked, film.crop_width * film.crop_height)
         depth = self.lighting.integrator == "depth"
@@ -267,7 +273,8 @@ def render(
     seed: chooses the random numbers, as in ``mi.render``.
     sensor: number of the sensor, in the order of declaration; of a loaded scene also a
     sensor. threads: None takes all of Dr.Jit's pool.
-    aovs: further images, of depth, normal and prim.
+    aovs: further images, of depth, normal, prim, cost (natively only) and moment (by
+    Mitsuba only; (H, W, 6) with mean and second moment in XYZ).
     shadow_offset: how shadow rays are kept off surfaces: "mitsuba", by Mitsuba's formula;
     "robust", by a bound of the error, for scenes of any size. None takes what the scene
     gives its integrator `mlrt`, else "mitsuba".
@@ -334,6 +341,17 @@ def checked_spp(spp: int) -> int:
     if spp > 0xFFFFFFFF:
         raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
     return spp
+
+
+def own_spp(spp: int, sampler: str) -> int:
+    """The number of samples that a scene's sampler, of that name, says; raises SceneError
+    for none."""
+    if spp < 1:
+        raise SceneError(
+            f"{sampler or 'the sampler'} has sample_count = {spp}, so its image would have "
+            "no samples: set it to 1 or more, or choose another number with --spp (spp=)"
+        )
+    return checked_spp(spp)
 
 
 def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -73,6 +73,12 @@ def judge_pixels(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def judge_parity(arguments: Sequence[str]) -> int:
+    from .parity_command import run
+
+    return run(arguments)
+
+
 def speed_and_error(arguments: Sequence[str]) -> int:
     from .speed_error_command import run
 
@@ -95,6 +101,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
     "ztest": judge_pixels,
+    "parity": judge_parity,
     "speed-error": speed_and_error,
     "sweep": sweep_scenes,
     "paper": repeat_the_paper,

@@ -226,9 +226,15 @@ def write_json(path: Path | None, figures: Any) -> None:
 
     Raises CannotRun if that is not possible.
     """
+    if path is not None:
+        text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False)
+        write_text(path, text + "\n")
+
+
+def write_text(path: Path | None, text: str) -> None:
+    """Writes a text, all of it or no file. Raises CannotRun if that is not possible."""
     if path is None:
         return
-    text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False) + "\n"
     temporary = path.with_name(f".{path.name}.unfinished")
     try:
         temporary.write_text(text)
