@@ -2,7 +2,8 @@
 
 An EXR file holds the channels R, G, B and one channel for each number of an AOV, in single
 precision, named as Mitsuba's `aov` integrator names them: ``depth.T``, ``normal.X``,
-``normal.Y``, ``normal.Z`` and ``prim.I``. A PNG file holds 8-bit sRGB.
+``normal.Y``, ``normal.Z`` and ``prim.I``; the moments as its `moment` names those of an
+integrator `direct`, ``direct.X`` to ``m2_direct.Z``. A PNG file holds 8-bit sRGB.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from .errors import OutputError
 FORMATS = (".exr", ".png")
 CHANNELS = {"depth": ("depth.T",), "normal": ("normal.X", "normal.Y", "normal.Z")}
 CHANNELS |= {"prim": ("prim.I",), "cost": ("cost.Y",)}
+CHANNELS["moment"] = tuple(
+    f"{name}.{axis}" for name in ("direct", "m2_direct") for axis in "XYZ"
+)
 
 
 def check_output(path: Path, aovs: tuple[str, ...] = ()) -> None:

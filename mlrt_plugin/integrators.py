@@ -11,7 +11,7 @@ from .materials import DELTA
 from .options import INTEGRATOR_OPTIONS
 from .scene_arrays import Feature, Lighting
 
-TAKEN_OVER = ("direct", "path", "mlrt", "depth", "aov")
+TAKEN_OVER = ("direct", "path", "mlrt", "depth", "aov", "moment")
 """Integrators of which all is done, if their parameters allow it."""
 MISSING = {
     "path": "the light of further bounces",
@@ -60,6 +60,7 @@ def lighting_of(root: Element) -> Lighting:
             variables = str(parameters.get("aovs", "")).replace(" ", "")
             pairs = [pair.partition(":") for pair in variables.split(",") if pair]
             parameters["aovs"] = tuple(variable for _, _, variable in pairs)
+        if integrator.plugin in ("aov", "moment"):
             parameters["nested"] = [e.plugin for e in nested]
             if len(nested) == 1:
                 parameters = {**nested[0].properties, **parameters}
@@ -150,23 +151,32 @@ def what_is_missing(lighting: Lighting) -> str:
         absent = [name for name in parameters.get("aovs", ()) if name not in AOV_NAMES]
         if absent:
             return f"the AOV '{absent[0]}'"
-        nested = parameters.get("nested", [])
-        if len(nested) > 1:
-            return "the images of all but the first of its integrators"
-        inner = nested[0] if nested else "direct"
-        if inner not in ("direct", "path", "mlrt"):
-            return f"what integrator '{inner}' in it computes"
-        if inner == "path" and int(parameters.get("max_depth", -1)) != 2:
-            return MISSING["path"]
-        return ""
-    if integrator in TAKEN_OVER:
+        return what_is_missing_inside(parameters)
+    if integrator == "moment" and parameters.get("nested"):
+        return what_is_missing_inside(parameters)
+    if integrator in TAKEN_OVER and integrator != "moment":
         return ""
     unknown = f"what '{integrator}' computes, which is none of Mitsuba's own integrators,"
     return MISSING.get(integrator, unknown)
 
 
+def what_is_missing_inside(parameters: dict[str, Any]) -> str:
+    """The same, of what is nested in `aov` and `moment`."""
+    nested = parameters.get("nested", [])
+    if len(nested) > 1:
+        return "the images of all but the first of its integrators"
+    inner = nested[0] if nested else "direct"
+    if inner not in ("direct", "path", "mlrt"):
+        return f"what integrator '{inner}' in it computes"
+    if inner == "path" and int(parameters.get("max_depth", -1)) != 2:
+        return MISSING["path"]
+    return ""
+
+
 def own_aovs(lighting: Lighting) -> tuple[str, ...]:
     """AOVs that the scene's integrator asks for, by their names here."""
+    if lighting.integrator == "moment" and not what_is_missing(lighting):
+        return ("moment",)
     if lighting.integrator != "aov":
         return ()
     wanted = lighting.parameters.get("aovs", ())
@@ -179,6 +189,8 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
     if lighting.integrator == "depth":
         return ""
     name = named(features, lighting)
+    if lighting.integrator == "moment" and not what_is_missing(lighting):
+        return f"{name} asks for second moments, which only the path by Mitsuba computes"
     if lighting.emitter_samples == 0:
         what = "max_depth" if lighting.integrator == "path" else "emitter_samples"
         return (

@@ -47,8 +47,8 @@ integrators mean the length of paths."""
 SHADOW_OFFSETS = ("mitsuba", "robust")
 """Values of the option ``shadow_offset``: ``cpp/render/shadow_offset.h``."""
 
-AOVS = ("depth", "normal", "prim", "cost")
-"""Images that can be had beside the colours."""
+AOVS = ("depth", "normal", "prim", "cost", "moment")
+"""Images that can be had beside the colours: `cost` natively, `moment` by Mitsuba only."""
 
 
 def integer(value: object, name: str) -> int:

@@ -42,6 +42,8 @@ REMEDIES = (
     ("invalid vertex", "repair the mesh or export it anew"),
     ("triangle mesh", "triangulate the mesh"),
     ("Plugin .* not found", "check the spelling of the plugin's type"),
+    ("crop window", "make the crop window lie within the film, or remove it"),
+    ("is out of bounds", "choose a value within these bounds"),
     ("missing version", 'add version="3.0.0" to the <scene>'),
     ("Parsing of XML", "mend the XML there"),
     (r"read \d+ out of", "the file is truncated, export it anew"),

@@ -24,7 +24,7 @@ from .options import (
     integer,
     split_options,
 )
-from .samplers import possible_spp, rounded
+from .samplers import checked_spp, own_spp, possible_spp, rounded
 from .scene_arrays import Lighting, SceneArrays, Shape, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
@@ -138,7 +138,13 @@ class PreparedScene(RayQueries):
         if build:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
-        asked = checked_spp(self.arrays.spp if spp is None else spp)
+        if "moment" in aovs:
+            raise MlrtError(
+                "aov 'moment' does not exist where shading is native: leave it out, or "
+                "choose shading = mitsuba"
+            )
+        name = next((str(f) for f in self.arrays.features if f.kind == "sampler"), "")
+        asked = own_spp(self.arrays.spp, name) if spp is None else checked_spp(spp)
         sampler, film = self.arrays.sampler, self.arrays.film
         samples = possible_spp(sampler, asked, film.crop_width * film.crop_height)
         depth = self.lighting.integrator == "depth"
@@ -289,7 +295,8 @@ def render(
     seed: chooses the random numbers, as in ``mi.render``.
     sensor: number of the sensor, in the order of declaration; of a loaded scene also a
     sensor. threads: None takes all of Dr.Jit's pool.
-    aovs: further images, of depth, normal and prim.
+    aovs: further images, of depth, normal, prim, cost (natively only) and moment (by
+    Mitsuba only; (H, W, 6) with mean and second moment in XYZ).
     shadow_offset: how shadow rays are kept off surfaces: "mitsuba", by Mitsuba's formula;
     "robust", by a bound of the error, for scenes of any size. None takes what the scene
     gives its integrator `mlrt`, else "mitsuba".
@@ -338,17 +345,6 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
-
-
-def checked_spp(spp: int) -> int:
-    """The number of samples; raises MlrtError unless there is at least one, and TypeError
-    for anything but a whole number."""
-    spp = integer(spp, "spp")
-    if spp < 1:
-        raise MlrtError(f"spp = {spp} is too few: at least 1 sample per pixel is needed")
-    if spp > 0xFFFFFFFF:
-        raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
-    return spp
 
 
 def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

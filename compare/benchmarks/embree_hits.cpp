@@ -16,7 +16,8 @@ constexpr size_t RAYS_OF_A_TASK = 64 * WIDTH;
 constexpr float INFINITE = std::numeric_limits<float>::infinity();
 
 void trace_packet(const EmbreeScene &scene, const float *origins, const float *directions,
-                  size_t count, float *t, uint32_t *primitives) {
+                  size_t count, RTCIntersectContextFlags flags, float *t,
+                  uint32_t *primitives) {
     alignas(64) std::array<int, WIDTH> valid;
     RTCRayHit16 rays{};
     for (size_t i = 0; i < WIDTH; ++i) {
@@ -34,6 +35,7 @@ void trace_packet(const EmbreeScene &scene, const float *origins, const float *d
     }
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    context.flags = flags;
     rtcIntersect16(valid.data(), scene.handle(), &context, &rays);
     for (size_t i = 0; i < count; ++i) {
         const bool hit = rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
@@ -45,14 +47,16 @@ void trace_packet(const EmbreeScene &scene, const float *origins, const float *d
 } // namespace
 
 void closest_hits(const EmbreeScene &scene, const float *origins, const float *directions,
-                  size_t count, float *t, uint32_t *primitives) {
+                  size_t count, bool coherent, float *t, uint32_t *primitives) {
+    const RTCIntersectContextFlags flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                                    : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
     const auto tasks = uint32_t((count + RAYS_OF_A_TASK - 1) / RAYS_OF_A_TASK);
     parallel_for(tasks, [&](uint32_t task) {
         const FlushDenormals flush;
         const size_t end = std::min(count, (task + size_t(1)) * RAYS_OF_A_TASK);
         for (size_t i = task * RAYS_OF_A_TASK; i < end; i += WIDTH)
             trace_packet(scene, origins + 3 * i, directions + 3 * i,
-                         std::min(WIDTH, end - i), t + i, primitives + i);
+                         std::min(WIDTH, end - i), flags, t + i, primitives + i);
     });
 }
 

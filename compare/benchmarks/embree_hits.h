@@ -9,8 +9,8 @@
 namespace mlrt::bench {
 
 // Nearest hits of rays that are given as triples of floats, in 0 < t: the distance or
-// infinity, and the number of the face or NO_PRIMITIVE.
+// infinity, and the number of the face or NO_PRIMITIVE. `coherent` is a hint to Embree.
 void closest_hits(const EmbreeScene &scene, const float *origins, const float *directions,
-                  size_t count, float *t, uint32_t *primitives);
+                  size_t count, bool coherent, float *t, uint32_t *primitives);
 
 } // namespace mlrt::bench

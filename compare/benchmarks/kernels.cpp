@@ -16,10 +16,39 @@ namespace bench {
 template <Kernel kernel>
 struct KernelOrigins {};
 
+// What a kernel finds out about its rays once.
+template <Kernel kernel>
+struct Preparation {
+    void prepare(const RayPacket<LaneOrigins> &) {}
+};
+
+// Axes turned so that z is the one along which a ray goes the furthest, and the shear that
+// makes the ray the z axis, with direction (0, 0, 1).
+template <>
+struct Preparation<Kernel::sheared> {
+    LaneBits along_x = 0, along_y = 0;
+    Vec3<FloatPacket> shear;
+
+    void prepare(const RayPacket<LaneOrigins> &rays) {
+        const Vec3<FloatPacket> &d = rays.direction;
+        const FloatPacket x = absolute(d.x), y = absolute(d.y), z = absolute(d.z);
+        along_x = to_bits((x >= y) & (x >= z));
+        along_y = to_bits(y >= z) & ~along_x;
+        const Vec3<FloatPacket> turned = turn(d);
+        shear = {turned.x / turned.z, turned.y / turned.z, 1.0f / turned.z};
+    }
+    Vec3<FloatPacket> turn(const Vec3<FloatPacket> &v) const {
+        const auto x = from_bits<FloatPacket>(along_x), y = from_bits<FloatPacket>(along_y);
+        return {select(x, v.y, select(y, v.z, v.x)), select(x, v.z, select(y, v.x, v.y)),
+                select(x, v.x, select(y, v.y, v.z))};
+    }
+};
+
 } // namespace bench
 
 template <bench::Kernel kernel>
-struct RayPacket<bench::KernelOrigins<kernel>> : RayPacket<LaneOrigins> {};
+struct RayPacket<bench::KernelOrigins<kernel>> : RayPacket<LaneOrigins>,
+                                                 bench::Preparation<kernel> {};
 
 namespace bench {
 
@@ -50,6 +79,51 @@ PacketCandidates moeller_trumbore(const Vec3<Real> &origin, const Vec3<Real> &di
     return result;
 }
 
+LaneBits of_one_sign(const FloatPacket &u, const FloatPacket &v, const FloatPacket &w) {
+    const FloatPacket zero = 0.0f;
+    return to_bits(((u >= zero) & (v >= zero) & (w >= zero)) |
+                   ((u <= zero) & (v <= zero) & (w <= zero)));
+}
+
+PacketCandidates pluecker(const RayPacket<LaneOrigins> &rays, LaneBits lanes,
+                          const Triangle &triangle) {
+    const Vec3<FloatPacket> &o = rays.origin.point, &d = rays.direction;
+    const Vec3<FloatPacket> a = in_lanes<FloatPacket>(triangle.a) - o;
+    const Vec3<FloatPacket> b = in_lanes<FloatPacket>(triangle.b) - o;
+    const Vec3<FloatPacket> c = in_lanes<FloatPacket>(triangle.c) - o;
+    const auto volume = [&](const Vec3<FloatPacket> &p, const Vec3<FloatPacket> &q) {
+        return dot(cross(p + q, q - p), d);
+    };
+    PacketCandidates result;
+    const Vec3<FloatPacket> normal = cross(b - a, c - a);
+    const FloatPacket denominator = dot(normal, d);
+    result.hit = lanes & of_one_sign(volume(a, b), volume(b, c), volume(c, a)) &
+                 to_bits(absolute(denominator) > FloatPacket(0.0f));
+    if (result.hit != 0)
+        result.t = dot(normal, a) / denominator;
+    return result;
+}
+
+PacketCandidates sheared(const RayPacket<KernelOrigins<Kernel::sheared>> &rays,
+                         LaneBits lanes, const Triangle &triangle) {
+    const auto seen = [&](const Vec3f &vertex) -> Vec3<FloatPacket> {
+        const Vec3<FloatPacket> p =
+            rays.turn(in_lanes<FloatPacket>(vertex) - rays.origin.point);
+        return {p.x - rays.shear.x * p.z, p.y - rays.shear.y * p.z, rays.shear.z * p.z};
+    };
+    const Vec3<FloatPacket> a = seen(triangle.a), b = seen(triangle.b),
+                            c = seen(triangle.c);
+    const FloatPacket u = c.x * b.y - c.y * b.x, v = a.x * c.y - a.y * c.x,
+                      w = b.x * a.y - b.y * a.x;
+    const FloatPacket determinant = u + v + w;
+    PacketCandidates result;
+    result.hit =
+        lanes & of_one_sign(u, v, w) & to_bits(absolute(determinant) > FloatPacket(0.0f));
+    if (result.hit != 0)
+        result.t = (u * a.z + v * b.z + w * c.z) / determinant;
+    return result;
+}
+
 } // namespace
 
 // Found where PacketState tests triangles, by its argument.
@@ -61,6 +135,10 @@ PacketCandidates intersect(const RayPacket<KernelOrigins<kernel>> &rays, LaneBit
     else if constexpr (kernel == Kernel::double_precision)
         return moeller_trumbore(to_double(rays.origin.point), to_double(rays.direction),
                                 lanes, triangle);
+    else if constexpr (kernel == Kernel::pluecker)
+        return pluecker(rays, lanes, triangle);
+    else if constexpr (kernel == Kernel::sheared)
+        return sheared(rays, lanes, triangle);
     else
         return mlrt::intersect<LaneOrigins>(rays, lanes, triangle);
 }
@@ -75,6 +153,7 @@ void trace_packets(const KdTree &tree, const RayGroup &group, uint32_t begin, ui
         RayPacket<KernelOrigins<kernel>> rays;
         static_cast<RayPacket<LaneOrigins> &>(rays) =
             load_packet<LaneOrigins>(group, first).rays;
+        rays.prepare(rays);
         PacketState<Query::closest> state(rays);
         trace_packet(tree, rays, root_entry(tree), state, counters);
         const LaneArray<float> t =
@@ -96,6 +175,8 @@ Seconds trace_with(const KdTree &tree, Kernel kernel, const RayGroup &rays, HitG
     const auto trace =
         kernel == Kernel::single_precision   ? trace_packets<Kernel::single_precision>
         : kernel == Kernel::double_precision ? trace_packets<Kernel::double_precision>
+        : kernel == Kernel::pluecker         ? trace_packets<Kernel::pluecker>
+        : kernel == Kernel::sheared          ? trace_packets<Kernel::sheared>
                                              : trace_packets<Kernel::exact>;
     const Stopwatch watch;
     parallel_for((rays.count + PART - 1) / PART, [&](uint32_t i) {

@@ -147,8 +147,12 @@ Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
         kernel = Kernel::single_precision;
     else if (name == "double")
         kernel = Kernel::double_precision;
+    else if (name == "pluecker")
+        kernel = Kernel::pluecker;
+    else if (name == "sheared")
+        kernel = Kernel::sheared;
     else if (name != "exact")
-        refuse_value("kernel must be single, double or exact.");
+        refuse_value("kernel must be single, double, pluecker, sheared or exact.");
     nb::gil_scoped_release release;
     std::vector<float> columns[6];
     for (size_t k = 0; k < 6; ++k) {
@@ -232,8 +236,8 @@ void bind_mlrt(nb::module_ &m) {
             nb::arg("tile") = FrameSettings().tile_side)
         .def("trace_with", &trace_with_kernel, nb::arg("kernel"), nb::arg("origins"),
              nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
-             "Writes the nearest hits of rays by the kernel single, double or exact of "
-             "kernels.h.");
+             "Writes the nearest hits of rays by the kernel single, double, pluecker, "
+             "sheared or exact of kernels.h.");
 }
 
 void bind_embree(nb::module_ &m) {
@@ -257,18 +261,18 @@ void bind_embree(nb::module_ &m) {
         .def(
             "closest_hit",
             [](const EmbreeScene &self, const Points &origins, const Points &directions,
-               const Distances &t, const Numbers &primitives) {
+               const Distances &t, const Numbers &primitives, bool coherent) {
                 const size_t count = origins.shape(0);
                 if (directions.shape(0) != count || t.shape(0) != count ||
                     primitives.shape(0) != count)
                     refuse_value("origins, directions, t and primitives must have the same "
                                  "length.");
                 nb::gil_scoped_release release;
-                closest_hits(self, origins.data(), directions.data(), count, t.data(),
-                             primitives.data());
+                closest_hits(self, origins.data(), directions.data(), count, coherent,
+                             t.data(), primitives.data());
             },
             nb::arg("origins"), nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
-            "Writes the nearest hits of rays.")
+            nb::arg("coherent") = false, "Writes the nearest hits of rays.")
         .def_prop_ro("seconds", [](const EmbreeScene &self) { return self.seconds(); })
         .def_prop_ro("bytes", &EmbreeScene::bytes)
         .def_prop_ro("peak_bytes", &EmbreeScene::peak_bytes)

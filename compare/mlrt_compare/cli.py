@@ -37,6 +37,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted", file=sys.stderr)
         return INTERRUPTED
+    except OSError as error:
+        if os.environ.get("MLRT_DEBUG"):
+            raise
+        named = error.filename is not None and error.strerror is not None
+        message = f"{error.filename}: {error.strerror}" if named else str(error)
+        print(f"{PROGRAM}: {message}", file=sys.stderr)
+        return COULD_NOT_RUN
     except Exception as error:
         if os.environ.get("MLRT_DEBUG"):
             raise
@@ -66,6 +73,12 @@ def judge_pixels(arguments: Sequence[str]) -> int:
     return run(arguments)
 
 
+def judge_parity(arguments: Sequence[str]) -> int:
+    from .parity_command import run
+
+    return run(arguments)
+
+
 def speed_and_error(arguments: Sequence[str]) -> int:
     from .speed_error_command import run
 
@@ -88,6 +101,7 @@ COMMANDS: dict[str, Callable[[Sequence[str]], int]] = {
     "scene": compare_scene,
     "image": compare_images,
     "ztest": judge_pixels,
+    "parity": judge_parity,
     "speed-error": speed_and_error,
     "sweep": sweep_scenes,
     "paper": repeat_the_paper,

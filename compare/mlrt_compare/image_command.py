@@ -19,6 +19,7 @@ from .options import (
     check_json,
     check_output_folder,
     number,
+    percentage,
     write_json,
 )
 
@@ -92,7 +93,7 @@ def image_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--channels",
-        type=lambda text: tuple(filter(None, text.split(","))),
+        type=channels,
         metavar="A,B",
         help="channels to compare (all, which both must have)",
     )
@@ -105,7 +106,7 @@ def image_parser() -> argparse.ArgumentParser:
         )
         parser.add_argument(
             f"--{word}percent",
-            type=number,
+            type=percentage,
             default=0.0,
             metavar="P",
             help=f"percentage of the pixels that may differ by more than --{word} (0)",
@@ -142,6 +143,13 @@ def image_parser() -> argparse.ArgumentParser:
     )
     add_output_options(parser, "maps of the difference and of FLIP as PNG")
     return parser
+
+
+def channels(text: str) -> tuple[str, ...]:
+    found = tuple(filter(None, text.split(",")))
+    if not found:
+        raise argparse.ArgumentTypeError("no channel is named")
+    return found
 
 
 def metric_limit(text: str) -> tuple[str, float]:

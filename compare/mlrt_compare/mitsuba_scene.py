@@ -69,6 +69,9 @@ def _loaded(
         )
         mi.parser.transform_all(config, state)
         scene = mi.parser.instantiate(config, state)
+    if settings.resolution is not None:
+        for sensor in scene.sensors():
+            _resize(sensor, settings.resolution)
     default = {
         "type": "direct",
         "emitter_samples": emitter_samples,
@@ -102,3 +105,12 @@ def _align(state: Any, settings: Settings, keep_sampler: bool) -> None:
             node.props["pixel_format"] = "rgb"
             if settings.resolution is not None:
                 node.props["width"], node.props["height"] = settings.resolution
+
+
+def _resize(sensor: Any, size: tuple[int, int]) -> None:
+    """Gives the size to a film that the scene does not declare, and Mitsuba adds."""
+    if tuple(sensor.film().size()) != size:
+        parameters = mi.traverse(sensor)
+        parameters["film.size"] = size
+        parameters["film.crop_size"] = size
+        parameters.update()

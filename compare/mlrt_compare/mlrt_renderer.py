@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import mlrt_plugin
 from mlrt_plugin.errors import MlrtError
+from mlrt_plugin.integrators import what_is_missing
 from mlrt_plugin.parsing import resolving_from
 from mlrt_plugin.render import prepare
 
@@ -51,6 +52,11 @@ class MlrtRenderer:
     def by_mitsuba(self) -> bool:
         """Whether Mitsuba's plugins shade, the scene's own sampler among them."""
         return self._prepared.shading.path == "mitsuba"
+
+    @property
+    def missing(self) -> str:
+        """What the scene's integrator computes besides; empty if nothing."""
+        return what_is_missing(self._prepared.lighting)
 
     @property
     def integrator(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
@@ -45,6 +46,11 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed", type=at_least(0, SEED_LIMIT), default=0, help="random seed (0)"
     )
+    add_choices_of_all(parser)
+
+
+def add_choices_of_all(parser: argparse.ArgumentParser) -> None:
+    """Those of `add_scene_choices` of which there is one for all images of a command."""
     parser.add_argument(
         "-D",
         dest="define",
@@ -72,7 +78,7 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "-a",
         dest="append",
-        type=Path,
+        type=existing_folder,
         action="append",
         default=[],
         metavar="DIR",
@@ -87,12 +93,23 @@ def add_scene_choices(parser: argparse.ArgumentParser) -> None:
 
 def settings_of(options: argparse.Namespace, scene: Path, spp: int | None) -> Settings:
     """What the options of `add_scene_choices` ask for."""
+    return settings_with(options, scene, spp, options.seed, options.resolution)
+
+
+def settings_with(
+    options: argparse.Namespace,
+    scene: Path,
+    spp: int | None,
+    seed: int,
+    resolution: tuple[int, int] | None,
+) -> Settings:
+    """What the options of `add_choices_of_all` ask for, with the rest given."""
     return Settings(
         scene=scene,
         spp=spp,
-        seed=options.seed,
+        seed=seed,
         sensor=options.sensor,
-        resolution=options.resolution,
+        resolution=resolution,
         threads=options.threads,
         shading=options.shading,
         folders=tuple(options.append),
@@ -141,6 +158,20 @@ def number(text: str) -> float:
     return value
 
 
+def percentage(text: str) -> float:
+    value = number(text)
+    if not 0 <= value <= 100:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0 to 100")
+    return value
+
+
+def existing_folder(text: str) -> Path:
+    path = Path(text)
+    if not path.is_dir():
+        raise argparse.ArgumentTypeError(f"there is no folder {text!r}")
+    return path
+
+
 def resolution(text: str) -> tuple[int, int]:
     width, cross, height = text.partition("x")
     if not (
@@ -168,6 +199,7 @@ def check_output_folder(folder: Path) -> None:
             f"the output folder {folder} cannot be made: there is no folder "
             f"{folder.absolute().parent}"
         )
+    check_permission(folder if folder.exists() else folder.absolute().parent)
 
 
 def check_json(path: Path | None) -> None:
@@ -178,17 +210,37 @@ def check_json(path: Path | None) -> None:
         raise CannotRun(f"the file {path} to write figures to is a folder")
     if not path.absolute().parent.is_dir():
         raise CannotRun(f"there is no folder {path.parent} to write {path} to")
+    check_permission(path.absolute().parent)
+
+
+def check_permission(folder: Path) -> None:
+    """Raises CannotRun for a folder that files cannot be made in."""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise CannotRun(
+            f"there is no permission to write to the folder {folder}: name another"
+        )
 
 
 def write_json(path: Path | None, figures: Any) -> None:
-    """Writes figures, all of them or no file; a number that is not finite becomes null."""
+    """Writes figures, all of them or no file; a number that is not finite becomes null.
+
+    Raises CannotRun if that is not possible.
+    """
+    if path is not None:
+        text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False)
+        write_text(path, text + "\n")
+
+
+def write_text(path: Path | None, text: str) -> None:
+    """Writes a text, all of it or no file. Raises CannotRun if that is not possible."""
     if path is None:
         return
-    text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False) + "\n"
     temporary = path.with_name(f".{path.name}.unfinished")
     try:
         temporary.write_text(text)
         temporary.replace(path)
+    except OSError as error:
+        raise CannotRun(f"{path} cannot be written: {error.strerror}") from error
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -69,14 +69,51 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     kept = folder / FIGURES
     cache = options.cache or default_cache()
     figures = new_figures("paper", machine_record(source, None), asdict(plan))
+    if options.resume:
+        figures["scenes"] = scenes_to_keep(folder, figures)
+        done = {scene["name"] for scene in figures["scenes"]}
+        scenes = [scene for scene in scenes if scene.name not in done]
 
     def measure_scene(loaded: Any, scene: dict[str, Any]) -> None:
         for part in study(loaded, plan):
             scene |= part
             keep(kept, figures)
 
-    measure_scenes(figures, scenes, lambda chosen: chosen.load(cache), measure_scene, kept)
+    if scenes:
+        measure_scenes(
+            figures, scenes, lambda chosen: chosen.load(cache), measure_scene, kept
+        )
     return figures
+
+
+def scenes_to_keep(folder: Path, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those that an earlier run has measured to the end, if there was one.
+
+    Raises CannotRun if it had other settings, another machine or another commit, as then
+    its figures do not belong to those to come.
+    """
+    from .paper.study import measured
+
+    if not (folder / FIGURES).is_file():
+        return []
+    earlier = read_figures(folder)
+    for part, keys in (
+        ("settings", tuple(figures["settings"])),
+        ("machine", ("processor", "isa", "commit", "mlrt")),
+    ):
+        for name in keys:
+            was, now = (json_value(each[part].get(name)) for each in (earlier, figures))
+            if was != now:
+                raise CannotRun(
+                    f"{folder / FIGURES} was measured with another {name}, {was} and not "
+                    f"{now}: measure into another folder"
+                )
+    return measured(earlier)
+
+
+def json_value(value: Any) -> Any:
+    """As it comes back from a file."""
+    return json.loads(json.dumps(value))
 
 
 def read_figures(folder: Path) -> dict[str, Any]:
@@ -84,7 +121,9 @@ def read_figures(folder: Path) -> dict[str, Any]:
     path = folder / FIGURES
     try:
         figures = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        raise CannotRun(f"{path} cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise CannotRun(f"{path} cannot be read: {error}") from error
     if not (isinstance(figures, dict) and figures.get("benchmark") == "paper"):
         raise CannotRun(f"{path} was not written by {PROGRAM} paper")
@@ -161,6 +200,13 @@ def paper_parser() -> argparse.ArgumentParser:
         "--quick",
         action="store_true",
         help=f"a trial: {QUICK_RESOLUTION} pixels, {QUICK_REPEATS} frames, unless told",
+    )
+    parser.add_argument(
+        "--continue",
+        dest="resume",
+        action="store_true",
+        help=f"keep the scenes that {FIGURES} in the folder has to the end, and measure "
+        "the others only",
     )
     parser.add_argument(
         "--redraw",

@@ -141,6 +141,7 @@ def setting_rows(comparison: Comparison) -> list[tuple[str, str]]:
         ("seed", str(settings.seed)),
         ("sensor", str(settings.sensor)),
         ("threads", str(comparison.threads)),
+        ("shaded by", comparison.shading),
         *((f"${key}", str(value)) for key, value in settings.defines.items()),
         *(("warning", warning) for warning in comparison.warnings),
     ]

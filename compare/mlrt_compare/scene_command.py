@@ -61,7 +61,7 @@ def run(arguments: Sequence[str]) -> int:
         paths = write_outputs(comparison, folder, page)
         figures = comparison.as_dict()
         write_json(options.json, figures)
-    except (MlrtError, OSError) as error:
+    except MlrtError as error:
         raise CannotRun(str(error)) from error
     print(summary(figures))
     print("wrote " + ", ".join(map(str, paths)))

@@ -157,7 +157,7 @@ def plot(figures: dict[str, Any], kind: str) -> bytes:
     axes.set_ylabel("MSE against the reference")
     axes.set_title(f"{figures['scene']}: numbers are samples a pixel", fontsize=10)
     axes.grid(True, which="both", alpha=0.25)
-    axes.legend()
+    figure.legend(loc="outside upper center", ncols=2)
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, dpi=150)
     return stream.getvalue()

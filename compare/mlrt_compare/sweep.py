@@ -47,6 +47,9 @@ class Job:
             words.append("--resolution={}x{}".format(*settings.resolution))
         if settings.threads is not None:
             words.append(f"-t{settings.threads}")
+        if settings.shading is not None:
+            words.append(f"--shading={settings.shading}")
+        words += [f"-a{folder.resolve()}" for folder in settings.folders]
         return words + [f"-D{key}={value}" for key, value in settings.defines.items()]
 
     def name(self) -> str:
@@ -57,7 +60,7 @@ class Job:
         settings = self.settings
         depends = (
             scene_hash(settings),
-            (settings.spp, settings.seed, settings.threads, self.rounds),
+            (settings.spp, settings.seed, settings.threads, self.rounds, settings.shading),
             # The version alone does not tell one build from another.
             (file_hash(Path(str(core.__file__))), version("mitsuba"), version("drjit")),
         )

@@ -12,15 +12,16 @@ from typing import Any
 from .options import (
     COULD_NOT_RUN,
     PROGRAM,
+    SEED_LIMIT,
     CannotRun,
     Parser,
+    add_choices_of_all,
     at_least,
     check_output_folder,
-    definition,
     resolution,
+    settings_with,
     write_json,
 )
-from .settings import Settings
 from .timing import DEFAULT_ROUNDS
 
 
@@ -35,18 +36,7 @@ def run(arguments: Sequence[str]) -> int:
     from .sweep import Job, Results, locally, on_dask, sweep
 
     jobs = [
-        Job(
-            Settings(
-                scene=scene,
-                spp=spp,
-                seed=seed,
-                sensor=options.sensor,
-                resolution=size,
-                threads=options.threads,
-                defines=dict(options.define),
-            ),
-            options.rounds,
-        )
+        Job(settings_with(options, scene, spp, seed, size), options.rounds)
         for scene, size, spp, seed in itertools.product(
             options.scenes, options.resolution, options.spp, options.seed
         )
@@ -54,7 +44,7 @@ def run(arguments: Sequence[str]) -> int:
     executor = locally(options.jobs) if options.dask is None else on_dask(options.dask)
     try:
         found = sweep(jobs, Results(folder / "results"), executor, tell)
-    except (MlrtError, OSError) as error:
+    except MlrtError as error:
         raise CannotRun(str(error)) from error
     write_json(folder / "sweep.json", found)
     text = table(found, options.jobs if options.dask is None else None)
@@ -113,7 +103,11 @@ def sweep_parser() -> argparse.ArgumentParser:
         help="samples a pixel (the scene's)",
     )
     parser.add_argument(
-        "--seed", type=listed(at_least(0, 2**32)), default=(0,), metavar="N,M", help="(0)"
+        "--seed",
+        type=listed(at_least(0, SEED_LIMIT)),
+        default=(0,),
+        metavar="N,M",
+        help="(0)",
     )
     parser.add_argument(
         "--resolution",
@@ -122,21 +116,7 @@ def sweep_parser() -> argparse.ArgumentParser:
         metavar="WxH,...",
         help="sizes of the film (the scene's)",
     )
-    parser.add_argument(
-        "-D",
-        dest="define",
-        type=definition,
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="value of a $parameter of all scenes",
-    )
-    parser.add_argument(
-        "-s", dest="sensor", type=at_least(0), default=0, metavar="SENSOR", help="(0)"
-    )
-    parser.add_argument(
-        "-t", dest="threads", type=at_least(1), metavar="THREADS", help="of each job (all)"
-    )
+    add_choices_of_all(parser)
     parser.add_argument(
         "--rounds", type=at_least(1), default=DEFAULT_ROUNDS, help="timed (%(default)s)"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import math
 import sys
 import tempfile
@@ -25,7 +26,9 @@ from .options import (
     check_output_folder,
     settings_of,
     write_json,
+    write_text,
 )
+from .scene_files import common_folder, scenes_in, told_from
 from .settings import Settings
 
 if TYPE_CHECKING:
@@ -47,6 +50,15 @@ class Judged:
     test: ZTest | None = None
     reference: Reference | None = None
     error: str = ""
+    path: str = ""
+    """Who shades: native or mitsuba."""
+    integrator: str = ""
+    """What was asked for in place of the scene's integrator, with its samples."""
+    asks_for_more: str = ""
+    """What the scene's integrator computes besides direct light."""
+    seconds: float = math.nan
+    """Of rendering the image."""
+    notes: tuple[str, ...] = ()
 
     @property
     def code(self) -> int:
@@ -59,9 +71,10 @@ class Judged:
         test, reference = self.test, self.reference
         if test is None or reference is None:
             return f"{self.name}: {self.error}"
+        name = f"{self.name}, {self.path}" if self.path else self.name
         known = f", {reference.spp:.0f} spp" if math.isfinite(reference.spp) else ""
         return (
-            f"{'PASS' if test.pixels_pass else 'FAIL'} {self.name}: "
+            f"{'PASS' if test.pixels_pass else 'FAIL'} {name}: "
             f"{100 * test.passing:.4f} % of the pixels' channels pass, smallest p "
             f"{test.smallest_p:.2g} at alpha {test.alpha:.2g}, of the mean "
             f"{test.mean_p:.2g}; {test.spp} spp against {reference.source}{known}"
@@ -70,10 +83,15 @@ class Judged:
     def as_dict(self) -> dict[str, Any]:
         """All figures; JSON has None for those that are not finite."""
         figures: dict[str, Any] = {"name": self.name, "code": self.code}
+        for name in ("path", "integrator", "asks_for_more"):
+            if getattr(self, name):
+                figures[name] = getattr(self, name)
         if self.test is None or self.reference is None:
             return {**figures, "error": self.error}
         figures["reference"] = self.reference.source
         figures["reference_spp"] = self.reference.spp
+        figures["seconds"] = self.seconds
+        figures["notes"] = list(self.notes)
         return {**figures, **self.test.as_dict()}
 
 
@@ -84,11 +102,13 @@ def run(arguments: Sequence[str]) -> int:
     if options.output is not None:
         check_output_folder(options.output)
     check_json(options.json)
+    check_json(options.table)
     images = [path for path in options.inputs if path.suffix.lower() == ".exr"]
     if not images:
         judged = judge_scenes(options)
     elif len(images) == len(options.inputs) == 3:
         judged = [judge_images(options)]
+        write_json(options.json, [one.as_dict() for one in judged])
     else:
         raise CannotRun(
             "name scenes, or three EXR files: the image, the reference and the variance of "
@@ -96,8 +116,10 @@ def run(arguments: Sequence[str]) -> int:
         )
     if options.output is not None:
         write_p_maps(judged, options.output)
-    write_json(options.json, [one.as_dict() for one in judged])
-    return max(one.code for one in judged)
+    return max(
+        (one.code for one in judged if one.test or Path(one.name) in options.inputs),
+        default=COULD_NOT_RUN,
+    )
 
 
 def judge_images(options: argparse.Namespace) -> Judged:
@@ -120,17 +142,37 @@ def judge_images(options: argparse.Namespace) -> Judged:
 
 def judge_scenes(options: argparse.Namespace) -> list[Judged]:
     """Renders and tests each scene; one that cannot be rendered does not stop the
-    others."""
+    others. What is known is written after each of them."""
     from mlrt_plugin.errors import MlrtError
 
-    found = []
-    for scene in options.inputs:
+    found: list[Judged] = []
+    scenes = scenes_in(options.inputs)
+    for scene in scenes:
         try:
-            found.append(judge_scene(settings_of(options, scene, options.spp), options))
+            for settings in settings_of_paths(options, scene):
+                found.append(judge_scene(settings, options))
         except (MlrtError, CannotRun) as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
             found.append(Judged(str(scene), error=str(error)))
+        rows = told_from([one.as_dict() for one in found], common_folder(scenes))
+        write_json(options.json, rows)
+        write_text(options.table, table(rows))
     return found
+
+
+def settings_of_paths(options: argparse.Namespace, scene: Path) -> list[Settings]:
+    """What to render of a scene: once, or by each path that can. Raises MlrtError for a
+    scene that cannot be read."""
+    settings = settings_of(options, scene, options.spp)
+    if not options.each_path:
+        return [settings]
+    from mlrt_plugin.parsing import resolving_from
+    from mlrt_plugin.shading_choice import choose_shading
+
+    with resolving_from(*settings.folders):
+        chosen = choose_shading(scene, sensor=settings.sensor, defines=settings.defines)
+    paths = ("mitsuba",) if chosen.path == "mitsuba" else ("native", "mitsuba")
+    return [dataclasses.replace(settings, shading=path) for path in paths]
 
 
 def judge_scene(settings: Settings, options: argparse.Namespace) -> Judged:
@@ -147,21 +189,22 @@ def judge_scene(settings: Settings, options: argparse.Namespace) -> Judged:
     cache = ReferenceCache(options.cache)
     with thread_count(settings.threads):
         renderer = MlrtRenderer(settings)
-        for warning in (*renderer.warnings, *warnings_of_filter(settings)):
+        notes = (*renderer.warnings, *warnings_of_filter(settings))
+        for warning in notes:
             print(f"{PROGRAM}: warning: {warning}", file=sys.stderr)
         spp = settings.spp
         if spp is None:
             renderer.frame(spp=1)
             height, width = renderer.image.shape[:2]
             spp = max(1, SAMPLE_BUDGET // (height * width))
-        renderer.frame(spp=spp)
+        seconds = renderer.frame(spp=spp)
         image = renderer.image
         reference = None if settings.resolution else stored_reference(settings.scene)
         if reference is None:
             with ProgressBar(f"reference of {settings.scene.name}") as bar:
                 reference = rendered_reference(
                     settings,
-                    options.reference_spp or REFERENCE_FACTOR * spp,
+                    options.reference_spp or options.reference_factor * spp,
                     cache,
                     integrator=renderer.integrator,
                     authored=options.authored,
@@ -173,7 +216,50 @@ def judge_scene(settings: Settings, options: argparse.Namespace) -> Judged:
             f"the image {image.shape}"
         )
     test = z_test(to_xyz(image), reference.mean, reference.variance, spp)
-    return told(Judged(str(settings.scene), test, reference))
+    return told(
+        Judged(
+            str(settings.scene),
+            test,
+            reference,
+            path="mitsuba" if renderer.by_mitsuba else "native",
+            integrator=named(renderer.integrator),
+            asks_for_more=renderer.missing,
+            seconds=seconds,
+            notes=notes,
+        )
+    )
+
+
+def named(integrator: dict[str, Any]) -> str:
+    """An integrator of Mitsuba and its numbers of samples, in words."""
+    counts = [str(n) for name, n in integrator.items() if name.endswith("_samples")]
+    return " + ".join([str(integrator["type"]), *counts]).replace(" + ", " ", 1)
+
+
+def table(rows: Sequence[dict[str, Any]]) -> str:
+    """All tests as Markdown, of the figures of each."""
+    lines = [
+        "| scene | path | samples | asks for more | spp | reference, spp "
+        "| pixels' channels that pass (%) | smallest p | p of the mean | seconds | |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    skipped = []
+    for row in rows:
+        if "error" in row:
+            skipped.append(f"- {row['name']}: {row['error']}")
+            continue
+        known = row["reference_spp"]
+        lines.append(
+            f"| {row['name']} | {row['path']} | {row['integrator']} "
+            f"| {row.get('asks_for_more', 'no')} | {row['spp']} "
+            f"| {row['reference']}{f', {known:.0f}' if math.isfinite(known) else ''} "
+            f"| {100 * row['passing_share']:.4f} | {row['smallest_p']:.2g} "
+            f"| {row['mean_p']:.2g} | {row['seconds']:.2g} "
+            f"| {'pass' if row['pixels_pass'] else 'FAIL'} |"
+        )
+    if skipped:
+        lines += ["", "Not judged:", "", *skipped]
+    return "\n".join(lines) + "\n"
 
 
 def warnings_of_filter(settings: Settings) -> list[str]:
@@ -236,9 +322,9 @@ def ztest_parser() -> argparse.ArgumentParser:
         "inputs",
         type=Path,
         nargs="+",
-        metavar="SCENE|IMAGE",
-        help="XML files; or three EXR files, with --spp: image, reference, variance of a "
-        "sample",
+        metavar="SCENE|FOLDER|IMAGE",
+        help="XML files, or folders of such; or three EXR files, with --spp: image, "
+        "reference, variance of a sample",
     )
     add_scene_choices(parser)
     parser.add_argument(
@@ -250,7 +336,23 @@ def ztest_parser() -> argparse.ArgumentParser:
         "--reference-spp",
         type=at_least(1),
         metavar="N",
-        help=f"samples a pixel of a reference that is rendered ({REFERENCE_FACTOR} times)",
+        help="samples a pixel of a reference that is rendered",
+    )
+    parser.add_argument(
+        "--reference-factor",
+        type=at_least(1),
+        default=REFERENCE_FACTOR,
+        metavar="N",
+        help="the same, in samples of what is tested (%(default)s); the test knows the "
+        "noise of both",
+    )
+    parser.add_argument(
+        "--each-path",
+        action="store_true",
+        help="test the image of each path that can render a scene, native and mitsuba",
+    )
+    parser.add_argument(
+        "--table", type=Path, metavar="FILE", help="write a table in Markdown there"
     )
     parser.add_argument(
         "--authored",

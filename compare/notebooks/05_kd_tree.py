@@ -56,7 +56,7 @@ from mlrt_compare.report import to_srgb8
 
 tiles = mlrt_plugin.image_tiles(prepared, initial_tile=64, minimum_tile=8)
 final = [tile for tile in tiles if not tile.split]
-result = prepared.render(spp=4, aovs=("cost",))
+result = prepared.render(spp=16, aovs=("cost",))
 picture = to_srgb8(result.image)
 depths = [tile.depth for tile in final if tile.node is not None]
 scale = plt.cm.ScalarMappable(plt.Normalize(0, np.percentile(depths, 98)), "inferno")

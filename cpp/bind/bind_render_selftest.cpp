@@ -80,7 +80,7 @@ std::vector<float> filter_weights(const nb::dict &film,
 std::pair<std::vector<float>, std::vector<float>>
 accumulate(const nb::dict &film_dict, const std::vector<std::array<float, 3>> &samples) {
     const Film film = film_from(film_dict);
-    FilmBlocks blocks(film, 1);
+    FilmBlocks blocks(film, 1, uint32_t(samples.size()));
     const PixelRect &sampled = blocks.sampled();
     for (const auto &[x, y, value] : samples) {
         const float *values = &value;

@@ -15,13 +15,15 @@ uint32_t divide_up(uint32_t a, uint32_t b) {
 
 } // namespace
 
-FilmBlocks::FilmBlocks(const Film &film, uint32_t channel_count)
+FilmBlocks::FilmBlocks(const Film &film, uint32_t channel_count, uint32_t samples_per_pixel)
     : film_(film), filter_(film), sampled_(sampled_pixels(film, filter_)),
       channel_count_(channel_count), blocks_across_(divide_up(sampled_.width, BLOCK_SIZE)),
       blocks_down_(divide_up(sampled_.height, BLOCK_SIZE)),
       stride_(BLOCK_SIZE + 2 * uint32_t(filter_.reach())) {
     sums_.resize(size_t(blocks_across_) * blocks_down_ * stride_ * stride_ *
                  (channel_count_ + 1));
+    if (samples_per_pixel > MOST_PLAIN_SUMMANDS)
+        errors_.resize(sums_.size());
 }
 
 // Weights of a sample's pixels, of which the first lies (left, top) from it.
@@ -60,7 +62,9 @@ void FilmBlocks::add(uint32_t column, uint32_t row, size_t first, size_t count,
     const float center_y = float(sampled_.y + int(row) - reach) + 0.5f;
     for (size_t i = first; i < first + count; ++i) {
         const Footprint weights = footprint(center_x - x[i], center_y - y[i]);
-        if (channel_count_ == 3)
+        if (!errors_.empty())
+            spread_compensated(corner, weights, values, i);
+        else if (channel_count_ == 3)
             spread_colour(corner, weights, values, i);
         else
             spread(corner, weights, values, i);
@@ -81,7 +85,23 @@ void FilmBlocks::spread(float *corner, const Footprint &weights, const float *co
     }
 }
 
-// The same with the weight and three channels side by side: 1 * weight is exact.
+void FilmBlocks::spread_compensated(float *corner, const Footprint &weights,
+                                    const float *const *values, size_t sample) {
+    const size_t entry = channel_count_ + 1;
+    for (int j = 0; j < weights.taps; ++j) {
+        float *out = corner + size_t(j) * stride_ * entry;
+        for (int i = 0; i < weights.taps; ++i, out += entry) {
+            const float weight = weights.columns[i] * weights.rows[j];
+            float *errors = errors_.data() + (out - sums_.data());
+            add_compensated(weight, out[0], errors[0]);
+            for (uint32_t k = 0; k < channel_count_; ++k)
+                add_compensated(values[k][sample] * weight, out[1 + k], errors[1 + k]);
+        }
+    }
+}
+
+// The same as spread() with the weight and three channels side by side: 1 * weight is
+// exact.
 void FilmBlocks::spread_colour(float *corner, const Footprint &weights,
                                const float *const *values, size_t sample) const {
     const PointPacket entry(1.0f, values[0][sample], values[1][sample], values[2][sample]);

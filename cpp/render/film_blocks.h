@@ -2,6 +2,7 @@
 // nothing but the film decides.
 #pragma once
 
+#include "render/compensated_sum.h"
 #include "render/filter.h"
 
 #include <cstddef>
@@ -19,7 +20,8 @@ class FilmBlocks {
 public:
     static constexpr uint32_t BLOCK_SIZE = 32; // chosen: 32 x 32 x 4 floats are 16 KiB
 
-    FilmBlocks(const Film &film, uint32_t channel_count);
+    // samples_per_pixel: from MOST_PLAIN_SUMMANDS on sums are compensated.
+    FilmBlocks(const Film &film, uint32_t channel_count, uint32_t samples_per_pixel);
 
     const PixelRect &sampled() const { return sampled_; }
     uint32_t channel_count() const { return channel_count_; }
@@ -38,6 +40,8 @@ private:
     Footprint footprint(float left, float top) const;
     void spread(float *corner, const Footprint &weights, const float *const *values,
                 size_t sample) const;
+    void spread_compensated(float *corner, const Footprint &weights,
+                            const float *const *values, size_t sample);
     void spread_colour(float *corner, const Footprint &weights, const float *const *values,
                        size_t sample) const;
     const float *at(uint32_t block, int column, int row) const;
@@ -47,8 +51,9 @@ private:
     PixelRect sampled_;
     uint32_t channel_count_;
     uint32_t blocks_across_ = 0, blocks_down_ = 0;
-    uint32_t stride_ = 0;     // pixels along the side of a block's buffer
-    std::vector<float> sums_; // block, row, column, then the weight and the channels
+    uint32_t stride_ = 0;       // pixels along the side of a block's buffer
+    std::vector<float> sums_;   // block, row, column, then the weight and the channels
+    std::vector<float> errors_; // of the sums, in the same order, if they are compensated
 };
 
 } // namespace mlrt

@@ -11,7 +11,9 @@ PictureFilm::PictureFilm(const Film &film, uint32_t samples_per_pixel, FilmTarge
     const ReconstructionFilter filter(film);
     sampled_ = sampled_pixels(film, filter);
     if (!filter.is_box())
-        blocks_.emplace(film, channel_count());
+        blocks_.emplace(film, channel_count(), samples_per_pixel);
+    else if (samples_per_pixel > MOST_PLAIN_SUMMANDS)
+        errors_.resize(size_t(channel_count()) * sampled_.width * sampled_.height);
     for (uint32_t column = 0; column < column_codes_.size(); ++column)
         column_codes_[column] = morton_code(column, 0);
 }
@@ -63,10 +65,17 @@ void PictureFilm::add_whole_pixels(const PixelGroup &group, const float *const *
     for (uint32_t k = 0; k < channel_count(); ++k) {
         const float *value = values[k];
         for (size_t i = 0; i < group.offsets.size(); ++i) {
-            float &out = channel(k, number_of(group.pixel(i)));
+            const size_t number = number_of(group.pixel(i));
+            float &out = channel(k, number);
             float sum = first ? 0.0f : out;
-            for (uint32_t sample = 0; sample < group.sample_count; ++sample)
-                sum += *value++;
+            if (errors_.empty()) {
+                for (uint32_t sample = 0; sample < group.sample_count; ++sample)
+                    sum += *value++;
+            } else {
+                float &error = errors_[number * channel_count() + k];
+                for (uint32_t sample = 0; sample < group.sample_count; ++sample)
+                    add_compensated(*value++, sum, error);
+            }
             out = sum / divisor;
         }
     }

@@ -75,7 +75,8 @@ private:
     uint32_t samples_per_pixel_;
     FilmTarget target_;
     PixelRect sampled_;
-    std::optional<FilmBlocks> blocks_;                        // unless the filter is a box
+    std::optional<FilmBlocks> blocks_; // unless the filter is a box
+    std::vector<float> errors_; // of the sums of a box: pixel, channel; if compensated
     std::array<uint32_t, PixelGroup::MAX_SIDE> column_codes_; // Morton codes in row 0
 };
 

@@ -7,15 +7,21 @@ image; the source of the formulas is `direct.cpp` of Mitsuba 3.9.1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import mitsuba as mi
 
-from .hit_scene import HitScene
-
 mitsuba: Any = mi
 """For what Mitsuba's type stubs leave out."""
+
+
+class RayHits(Protocol):
+    """What answers rays of Mitsuba's type, a wavefront at a time, see `HitScene`."""
+
+    def closest_hit(self, ray: Any, active: Any) -> tuple[Any, Any]: ...
+
+    def any_hit(self, ray: Any, active: Any) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class DirectLight:
         self,
         module: Any,
         scene: Any,
-        hits: HitScene,
+        hits: RayHits,
         *,
         emitter_samples: int,
         bsdf_samples: int,

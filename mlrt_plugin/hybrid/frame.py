@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
 from .. import mitsuba_objects as objects
-from .direct_light import DirectLight, PrimaryHits
+from .direct_light import PrimaryHits
 from .samplers import IndependentStream, Pass, mitsubas_sampler, passes
 
-AOV_CHANNELS = {"depth": 1, "normal": 3}
+AOV_CHANNELS = {"depth": 1, "normal": 3, "moment": 6}
 """Numbers a pixel of those AOVs that are filtered as colours are."""
+
+
+class Light(Protocol):
+    """What computes the radiance along rays, see `DirectLight`."""
+
+    def radiance(self, ray: Any, sampler: Any) -> tuple[Any, PrimaryHits]: ...
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,8 @@ class Frame:
             border=False,
             coalesce=spp >= 4,
         )
+        self._sums: npt.NDArray[np.float64] | None = None
+        self._layer = (0, 0)
         self._faces = (
             dr.full(module.Int32, -1, self.area.pixels) if "prim" in aovs else None
         )
@@ -69,9 +77,14 @@ class Frame:
     def put(self, part: Pass, place: Any, color: Any, primary: PrimaryHits) -> None:
         """Adds the samples of a pass at places in pixels."""
         module, si = self._module, primary.interaction
+        layer = (part.wavefront, part.start)
+        if layer != self._layer:
+            self._layer = layer
+            self._take_down()
         values = {
             "depth": lambda: [dr.select(si.is_valid(), si.t, 0)],
             "normal": lambda: list(dr.select(si.is_valid(), si.sh_frame.n, 0)),
+            "moment": lambda: moments(module, color),
         }
         channels = [color.x, color.y, color.z]
         for name in self._filtered:
@@ -79,10 +92,17 @@ class Frame:
         self._block.put(place, [*channels, dr.full(module.Float, 1, part.count)])
         if self._faces is not None:
             pixel, sample = part.pixel_and_sample(module)
-            first = (sample == 0) & (dr.opaque(module.UInt32, part.wavefront) == 0)
+            first = sample == 0
+            first &= dr.opaque(module.UInt32, part.wavefront) == 0
             dr.scatter(self._faces, primary.face, pixel, first)
             dr.eval(self._faces)
         dr.eval(self._block.tensor())
+
+    def _take_down(self) -> None:
+        """Adds what the film holds in double precision, and empties the film."""
+        values = np.array(self._block.tensor(), np.float64)
+        self._sums = values if self._sums is None else self._sums + values
+        self._block.clear()
 
     def image(self) -> npt.NDArray[np.float32]:
         """Colours, (H, W, 3)."""
@@ -105,16 +125,28 @@ class Frame:
         return images
 
     def _developed(self, start: int, count: int) -> npt.NDArray[np.float32]:
-        sums = np.array(self._block.tensor(), np.float32)
+        # Not a copy: large films hold gigabytes.
+        sums = self._block.tensor().numpy()
+        if self._sums is not None:
+            sums = self._sums + sums
         weight = sums[..., -1:]
         channels = sums[..., start : start + count]
-        return np.divide(channels, weight, out=np.zeros_like(channels), where=weight != 0)
+        image = np.zeros(channels.shape, np.float32)
+        np.divide(channels, weight, out=image, where=weight != 0)
+        return image
+
+
+def moments(module: Any, color: Any) -> list[Any]:
+    """Of samples, in CIE XYZ, and their squares, as the integrator `moment` has them
+    (moment.cpp)."""
+    xyz = list(module.srgb_to_xyz(color))
+    return xyz + [dr.square(value) for value in xyz]
 
 
 def render_frame(
     module: Any,
     sensor: Any,
-    light: DirectLight,
+    light: Light,
     *,
     spp: int,
     seed: int,

@@ -36,7 +36,8 @@ class MitsubaScene:
     """A scene that Mitsuba has loaded, one of its sensors, and what is asked for.
 
     scene: has all lights, but maybe not all shapes. shapes: all but groups, which are
-    shapes that instances refer to. names: what messages call the shapes.
+    shapes that instances refer to. names, sampler_name: what messages call the shapes and
+    the sampler.
     warnings: what is approximated or ignored, a sentence each.
     """
 
@@ -47,6 +48,7 @@ class MitsubaScene:
     names: list[str]
     lighting: Lighting
     warnings: tuple[str, ...]
+    sampler_name: str = "the sampler"
 
     @property
     def module(self) -> Any:
@@ -119,7 +121,14 @@ def load_scene(
     names = [str(by_id.get(shape.id(), shape.id())) for shape in shapes]
     warnings += messages
     return MitsubaScene(
-        scene, shapes, groups, eye, names, lighting, tuple(dict.fromkeys(warnings))
+        scene,
+        shapes,
+        groups,
+        eye,
+        names,
+        lighting,
+        tuple(dict.fromkeys(warnings)),
+        str(next(chosen.children_of("sampler"), "the sampler")),
     )
 
 

@@ -21,15 +21,14 @@ from ..render import (
     as_depth,
     check_aovs,
     checked_seed,
-    checked_spp,
     chosen_shadow_offset,
 )
-from ..samplers import rounded
+from ..samplers import checked_spp, own_spp, rounded
 from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree
 from ..tree_report import tree_report
-from .direct_light import DirectLight
+from .direct_light import DirectLight, RayHits
 from .frame import render_frame
 from .hit_scene import HitScene, MeshFaces, mesh_faces, other_shapes
 from .loading import MitsubaScene, load_scene
@@ -86,6 +85,37 @@ class PreparedHybrid:
         """Warns of what is approximated or ignored, as if the caller did."""
         warn_of(self.warnings, stacklevel + 1)
 
+    def hits(self, **options: Any) -> HitScene:
+        """What answers the rays; `options` are fields of `TraceOptions`."""
+        trace = {**self.lighting.own_options(TRACE_OPTIONS), **options}
+        return HitScene(self.loaded.shapes, self.tree, self.faces, self.others, trace)
+
+    def light(
+        self,
+        hits: RayHits,
+        emitter_samples: int | None = None,
+        bsdf_samples: int | None = None,
+    ) -> DirectLight:
+        """What computes the radiance on hits of any origin, with as many samples as the
+        scene's integrator asks for unless told otherwise."""
+        lighting = self.lighting
+        depth = lighting.integrator == "depth"
+        counts = [
+            asked if own is None else own
+            for own, asked in (
+                (emitter_samples, lighting.emitter_samples),
+                (bsdf_samples, lighting.bsdf_samples),
+            )
+        ]
+        return DirectLight(
+            self.loaded.module,
+            self.loaded.scene,
+            hits,
+            emitter_samples=0 if depth else counts[0],
+            bsdf_samples=0 if depth else counts[1],
+            hide_emitters=self.hide_emitters and not depth,
+        )
+
     def render(
         self,
         *,
@@ -110,19 +140,11 @@ class PreparedHybrid:
             )
         lighting, loaded, sensor = self.lighting, self.loaded, self.loaded.sensor
         sampler = sensor.sampler()
-        asked = checked_spp(self.spp if spp is None else spp)
+        name = loaded.sampler_name
+        asked = own_spp(self.spp, name) if spp is None else checked_spp(spp)
         samples = possible_spp(sampler, asked)
-        trace = {**lighting.own_options(TRACE_OPTIONS), **options}
-        hits = HitScene(loaded.shapes, self.tree, self.faces, self.others, trace)
         depth = lighting.integrator == "depth"
-        light = DirectLight(
-            loaded.module,
-            loaded.scene,
-            hits,
-            emitter_samples=0 if depth else lighting.emitter_samples,
-            bsdf_samples=0 if depth else lighting.bsdf_samples,
-            hide_emitters=self.hide_emitters and not depth,
-        )
+        light = self.light(self.hits(**options))
         wanted = list(dict.fromkeys([*aovs, *(["depth"] if depth else own_aovs(lighting))]))
         start = time.perf_counter()
         try:

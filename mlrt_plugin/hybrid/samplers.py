@@ -21,17 +21,21 @@ SEED_STEP = 0x9E3779B9
 """From one wavefront of an image to the next; 2^32 divided by the golden ratio."""
 SAMPLES_OF_PASS = 2**20
 """Samples that are on their way at a time; chosen: they take some hundred bytes each."""
+MOST_SUMMANDS = 4096
+"""Samples of a pixel that a film of Mitsuba sums up in single precision; chosen: they lose
+a few times 1e-5 of the sum."""
 
 
 @dataclass(frozen=True)
 class Pass:
     """A run of samples of one wavefront.
 
-    wavefront: its number. spp: samples of a pixel in it, stride of them in the others.
-    first, count: numbers of the samples, p * spp + s.
+    wavefront: its number. start, spp: samples of a pixel that are taken, of stride in the
+    wavefront. first, count: numbers of the samples among these, p * spp + s.
     """
 
     wavefront: int
+    start: int
     spp: int
     stride: int
     first: int
@@ -42,25 +46,28 @@ class Pass:
         number = dr.arange(module.UInt32, self.count) + dr.opaque(module.UInt32, self.first)
         spp = dr.opaque(module.UInt32, self.spp)
         pixel = number // spp
-        return pixel, number - pixel * spp
+        return pixel, number - pixel * spp + dr.opaque(module.UInt32, self.start)
 
 
 def passes(pixels: int, spp: int, whole_pixels: bool) -> Iterator[Pass]:
-    """All samples of an image, in passes of at most SAMPLES_OF_PASS.
+    """All samples of an image, in passes of at most SAMPLES_OF_PASS, and of at most
+    MOST_SUMMANDS of a pixel.
 
     whole_pixels: whether all samples of a pixel stay together.
     """
-    size = SAMPLES_OF_PASS
+    size, most = SAMPLES_OF_PASS, MOST_SUMMANDS
     stride = spp
     if whole_pixels:
-        size = max(1, SAMPLES_OF_PASS // spp) * spp
+        size, most = max(1, SAMPLES_OF_PASS // spp) * spp, spp
     elif pixels * spp > LARGEST_WAVEFRONT:
         stride = max(1, spp // -(-pixels * spp // LARGEST_WAVEFRONT))
     for wavefront, done in enumerate(range(0, spp, stride)):
         here = min(stride, spp - done)
-        for first in range(0, pixels * here, size):
-            count = min(size, pixels * here - first)
-            yield Pass(wavefront, here, stride, first, count)
+        for start in range(0, here, most):
+            taken = min(most, here - start)
+            for first in range(0, pixels * taken, size):
+                count = min(size, pixels * taken - first)
+                yield Pass(wavefront, start, taken, stride, first, count)
 
 
 class IndependentStream:

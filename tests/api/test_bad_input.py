@@ -112,7 +112,11 @@ SCENES = {
     "huge film": (film(10**6, 10**6), "1000000x1000000"),
     "crop outside": (
         film(16, '12"/><integer name="crop_width" value="99'),
-        "crop",
+        "'hdrfilm': Invalid crop window.*make the crop window lie within the film",
+    ),
+    "crop before the film": (
+        film(16, '12"/><integer name="crop_offset_x" value="-4'),
+        "crop_offset_x.*-4 is out of bounds.*choose a value within",
     ),
     "circular reference": (
         {"extra": '<bsdf type="twosided" id="a"><ref id="a"/></bsdf>'},

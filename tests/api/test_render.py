@@ -118,6 +118,32 @@ def test_samples_per_pixel(scene_file: SceneFile) -> None:
     assert render(path, spp=5).counters["primary_rays"] == 16 * 12 * 5
 
 
+def test_scenes_without_samples_name_their_sampler(scene_file: SceneFile) -> None:
+    sampler = scene_files.SAMPLER.replace('"2"', '"0"')
+    path = scene_file(sensor=scene_files.SENSOR.replace(scene_files.SAMPLER, sampler))
+    expected = "sampler 'independent' at .*scene.xml line .* has sample_count = 0.*--spp"
+    with pytest.raises(SceneError, match=expected):
+        render(path)
+    assert render(path, spp=1).image.any()
+
+
+GLOW = """<shape type="rectangle">
+<transform name="to_world"><scale value="100"/></transform>
+<emitter type="area"><rgb name="radiance" value="0.37, 0.1, 5"/></emitter></shape>"""
+
+
+@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
+def test_millions_of_samples_keep_their_mean(scene_file: SceneFile, rfilter: str) -> None:
+    """Single precision loses what is added to a large sum: a seventh of 10^7 samples."""
+    sensor = scene_files.SENSOR.replace('value="16"', 'value="1"')
+    sensor = sensor.replace('value="12"', 'value="1"').replace("box", rfilter)
+    path = scene_file(shapes=GLOW, emitters="", sensor=sensor)
+    image = render(path, spp=2_000_000, aovs=("depth",))
+    np.testing.assert_allclose(image.image[0, 0], (0.37, 0.1, 5), rtol=2e-6)
+    few = render(path, spp=1000, aovs=("depth",))
+    np.testing.assert_allclose(image.aovs["depth"], few.aovs["depth"], rtol=1e-2)
+
+
 def test_resolution_and_defines(scene_file: SceneFile) -> None:
     path = scene_file(sensor=scene_files.SENSOR.replace('value="16"', 'value="$width"'))
     assert render(path, defines={"width": 20}).image.shape == (12, 20, 3)

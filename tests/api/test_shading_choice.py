@@ -92,6 +92,10 @@ AOV = (
         (AOV.format("a:albedo", "direct"), "the AOV 'albedo'"),
         (AOV.format("d:depth", "path"), "further bounces"),
         (AOV.format("d:depth", "moment"), "'moment' in it"),
+        (
+            '<integrator type="moment"><integrator type="path"/></integrator>',
+            "further bounces",
+        ),
     ],
 )
 def test_what_would_be_missing_must_be_allowed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -180,9 +181,14 @@ def bad_inputs(folder: Path) -> dict[str, tuple[tuple[object, ...], str]]:
         "no reference": ((right,), "REFERENCE"),
         "metric": ((right, right, "--fail-if", "beauty=1"), "beauty=1"),
         "threshold": ((right, right, "--fail", "nan"), "nan is not a number"),
+        "percentage": ((right, right, "--failpercent", "-3"), "-3 is not from 0 to 100"),
+        "no channel": ((right, right, "--channels", ","), "no channel is named"),
         "spp without variance": ((right, right, "--spp", "4"), "--variance"),
         "no folder": ((right, right, "-o", folder / "no" / "such"), "there is no folder"),
         "json": ((right, right, "--json", folder), "is a folder"),
+        # A folder in which not even root can make files.
+        "no json": ((right, right, "--json", "/proc/x.json"), "/proc/x.json cannot be"),
+        "no maps": ((right, right, "-o", "/proc/x"), "/proc/x: No such file"),
     }
 
 
@@ -195,3 +201,25 @@ def test_bad_input_is_one_sentence(
         lines = captured.err.splitlines()
         assert len(lines) == 1 and lines[0].startswith("mlrt-compare: "), (name, lines)
         assert said in lines[0], (name, lines)
+
+
+def test_a_folder_without_permission_is_told_of_before_the_work(
+    tmp_path: Path,
+    reference: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Root may write everywhere, so that the system's answer is made up."""
+    locked = tmp_path / "locked"
+    locked.mkdir()
+
+    def access(path: Path, mode: int) -> bool:
+        assert mode == os.W_OK | os.X_OK
+        return path != locked
+
+    monkeypatch.setattr(os, "access", access)
+    monkeypatch.setattr("mlrt_compare.image_pair.compare_pair", None)
+    for options in (("-o", locked), ("-o", locked / "new"), ("--json", locked / "x.json")):
+        assert run(reference, reference, *options) == 4
+        (line,) = capsys.readouterr().err.splitlines()
+        assert f"no permission to write to the folder {locked}" in line

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import repository
+from mlrt_compare.bench.camera_rays import camera_rays
 from mlrt_compare.bench.frame_runs import FrameRun
 from mlrt_compare.bench.measure import Timing
 from mlrt_compare.bench.scenes import BenchScene, imported
@@ -17,7 +18,7 @@ from mlrt_compare.cli import main
 from mlrt_compare.paper.ablation import ablate_culling, ablate_tree
 from mlrt_compare.paper.counts import counts_of
 from mlrt_compare.paper.frame_times import summary
-from mlrt_compare.paper.grouping import camera_rays, groupings
+from mlrt_compare.paper.grouping import groupings
 from mlrt_compare.paper.published import PUBLISHED, PublishedCounts
 from mlrt_compare.paper.scenes import StudiedScene
 from mlrt_compare.paper.sections import rate
@@ -288,6 +289,14 @@ def test_smaller_tiles_take_more_search_and_leave_less_to_packets(
     assert small["steps"] - small["entry_steps"] <= large["steps"] - large["entry_steps"]
 
 
+def test_tiles_of_large_scenes_are_counted_without_shadow_rays(
+    studied: StudiedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mlrt_compare.paper.tile_sweep.SHADOWED_TRIANGLES", 10)
+    (row,) = sweep_tiles(studied, Tiles((32,), (32,)), 1)
+    assert row["primary"]["steps"] > 0 and "primary_and_shadow" not in row
+
+
 def test_camera_rays_hit_what_the_image_shows(studied: StudiedScene) -> None:
     """Those of the control are the renderer's, through the centres of pixels: only where
     an edge passes through a pixel may its jittered ray meet another face."""
@@ -300,7 +309,7 @@ def test_camera_rays_hit_what_the_image_shows(studied: StudiedScene) -> None:
 
 
 def test_groupings_are_of_pixels_each_once() -> None:
-    orders = groupings(64, 16, 1)
+    orders = groupings(64, 16, 1, triangles=800)
     neighbours, within, random = orders.values()
     assert np.array_equal(np.sort(neighbours), np.arange(64 * 64))
     for order in (within, random):
@@ -315,6 +324,15 @@ def test_groupings_are_of_pixels_each_once() -> None:
     assert np.ptp(rows) == np.ptp(columns) == 3
     rows, columns = np.divmod(within[:16], 64)
     assert np.ptp(rows) > 3 and np.ptp(columns) > 3
+
+
+def test_random_groups_are_smaller_in_large_scenes() -> None:
+    def sizes(triangles: int) -> list[int]:
+        return [len(order) for order in groupings(256, 32, 1, triangles).values()]
+
+    assert sizes(282_238) == [256**2, 2**14, 2**11]
+    assert sizes(2_200_000) == [256**2, 3 * 32**2, 480]
+    assert sizes(7_200_000) == [256**2, 32**2, 256]
 
 
 def test_random_groups_cost_more_and_hit_the_same(run: Path) -> None:

@@ -258,6 +258,7 @@ def test_timings_and_tables_are_told(page: Any) -> None:
         "500 ms",
         "2 kernels of earlier runs",
         "a processor",
+        "shaded by\tnative",
         "$key",
         "a warning",
         "3 of 3072",

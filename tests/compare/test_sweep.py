@@ -80,6 +80,29 @@ def test_a_killed_sweep_loses_nothing_and_continues(tmp_path: Path) -> None:
     assert len(again) == 4 and done.items() <= again.items()
 
 
+def test_folders_and_shading_reach_the_jobs(tmp_path: Path) -> None:
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    (meshes / "wall.obj").write_text("v -9 -9 0\nv 9 -9 0\nv 0 9 0\nf 1 2 3\n")
+    scene = tmp_path / "wall.xml"
+    scene.write_text(
+        """<scene version="3.0.0"><integrator type="direct"/><sensor type="perspective">
+        <transform name="to_world"><lookat origin="0,0,5" target="0,0,0" up="0,1,0"/>
+        </transform></sensor><shape type="obj"><string name="filename" value="wall.obj"/>
+        </shape><emitter type="point"><point name="position" x="0" y="0" z="4"/></emitter>
+        </scene>"""
+    )
+    options = (scene, *SMALL, "--spp", 1, "--shading", "native", "-a", meshes)
+    assert run(*options, "-o", tmp_path / "out") == 0
+    (told,) = json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert told["shading"].startswith("native")
+    names = [
+        Job(Settings(SCENE, spp=1, shading=shading), 1).name()
+        for shading in ("native", "mitsuba")
+    ]
+    assert len(set(names)) == 2
+
+
 def jobs(*spp: int) -> list[Job]:
     return [Job(Settings(SCENE, spp=count), 1) for count in spp]
 
@@ -175,6 +198,7 @@ def test_no_scheduler_is_one_sentence(
         ((SCENE, "-j", "0"), "0 is less than 1"),
         ((SCENE, "--resolution", "8x8,9"), "WIDTHxHEIGHT"),
         ((SCENE, "-o", SCENE), "not a folder"),
+        ((SCENE, "-a", "nowhere"), "there is no folder 'nowhere'"),
     ],
 )
 def test_what_cannot_run_is_one_sentence(

@@ -16,6 +16,8 @@ from mlrt_compare.scalar_reference import stored_reference
 from mlrt_compare.scene_hash import scene_hash
 from mlrt_compare.settings import Settings
 
+import mlrt_llvm
+
 SCENE = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
 SMALL = ("--resolution", "24x24", "--spp", "64", "--reference-spp", "512")
 SEED = 20_260_810
@@ -40,6 +42,29 @@ def test_reference_is_rendered_once_and_kept(tmp_path: Path) -> None:
     assert run(SCENE, *SMALL, "--cache", cache) == 2
     kept.write_bytes(b"damaged")
     assert run(SCENE, *SMALL, "--cache", cache) == 0
+
+
+def test_each_path_of_a_folder(tmp_path: Path) -> None:
+    """With a table; what is no scene is told of and not counted."""
+    try:
+        mlrt_llvm.activate()
+    except mlrt_llvm.LlvmUnavailable as error:
+        pytest.skip(f"Mitsuba's llvm_ad_rgb: {error}")
+    folder = tmp_path / "scenes"
+    folder.mkdir()
+    (folder / "box.xml").write_text(SCENE.read_text())
+    (folder / "part.xml").write_text('<scene version="3.0.0"/>')
+    table, figures = tmp_path / "z.md", tmp_path / "z.json"
+    options = (*SMALL, "--cache", tmp_path / "cache", "--each-path")
+    assert run(folder, *options, "--table", table, "--json", figures) == 0
+    rows = json.loads(figures.read_text())
+    assert [row.get("path") for row in rows] == ["native", "mitsuba", None]
+    # Both take the same samples, so that one reference does for both.
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert all(row["pixels_pass"] for row in rows[:2])
+    text = table.read_text()
+    assert text.count("| pass |") == 2 and "- part.xml: scene" in text
+    assert run(folder / "part.xml", *options) == 4
 
 
 def test_stored_reference_of_mitsubas_tests_goes_before(
@@ -142,7 +167,7 @@ def test_one_that_cannot_be_tested_does_not_stop_the_others(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "SCENE|IMAGE"),
+        ((), "SCENE|FOLDER|IMAGE"),
         (("a.exr", "b.exr"), "three EXR files"),
         (("a.exr", "b.exr", "c.exr"), "--spp N"),
         (("a.exr", "b.exr", "c.exr", "--spp", "1"), "a.exr does not exist"),

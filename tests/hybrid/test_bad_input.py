@@ -89,10 +89,10 @@ CASES = {
         seen_by(parts.sensor(view='<transform name="to_world"><scale x="0"/></transform>')),
         "'perspective'.*singular to_world",
     ),
-    "crop outside of the film": (film(CROP), "crop window"),
+    "crop outside of the film": (film(CROP), "make the crop window lie within the film"),
     "no film": (seen_by(parts.sensor(size=(0, 9))), "width = 0"),
     "too large a film": (seen_by(parts.sensor(size=(10**6, 10**6))), "1000000x1000000"),
-    "no samples": (seen_by(parts.sensor(spp=0)), "spp = 0 is too few"),
+    "no samples": (seen_by(parts.sensor(spp=0)), "'independent'.*sample_count = 0"),
     "no light": (lit_by(""), "no emitter"),
     "no group": (parts.scene('<shape type="instance"/>'), "shapegroup"),
 }

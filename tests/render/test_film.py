@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import mitsuba as mi
@@ -120,3 +121,32 @@ def test_pixels_of_a_box_equal_those_of_an_image_block(
     np.testing.assert_array_equal(expected[..., 1], samples_per_pixel)
     for colour in np.moveaxis(np.reshape(image, (height, width, 3)), -1, 0):
         np.testing.assert_allclose(colour, expected[..., 0] / samples_per_pixel, rtol=3e-6)
+
+
+def test_sums_of_many_samples_are_compensated() -> None:
+    """Against sums without rounding; plain ones would be off by 1e-3."""
+    random = np.random.default_rng(17)
+    count = 300_000
+    own_film = film_with({"type": "gaussian", "stddev": 0.5}, crop_width=2, crop_height=1)
+    samples = np.column_stack(
+        [random.random((count, 2)) * (2, 1), np.full(count, 0.37)]
+    ).astype(np.float32)
+    sums, weights = core.render_selftest.accumulate(own_film, samples.tolist())
+    for column in range(2):
+        distances = samples[:, :2] - np.array([column + 0.5, 0.5], np.float32)
+        each = [
+            np.array(core.render_selftest.filter_weights(own_film, d.tolist()), np.float64)
+            for d in distances.T
+        ]
+        exact = math.fsum(each[0] * each[1])
+        assert weights[column] == pytest.approx(exact, rel=2e-6)
+        assert sums[column] == pytest.approx(0.37 * exact, rel=2e-6)
+
+
+def test_pixels_of_many_samples_are_compensated() -> None:
+    spp = 3_000_000
+    for rays_per_group in (4096, 1000):
+        image = core.render_selftest.picture(
+            film(crop_width=1, crop_height=1), spp, rays_per_group, [0.37] * spp
+        )
+        assert image[0] == pytest.approx(np.float32(0.37), rel=1e-6)

@@ -21,6 +21,7 @@ from .options import (
     add_study_options,
     check_folder_of,
     check_json,
+    check_plot,
     check_threads,
     count,
     names,
@@ -124,6 +125,15 @@ def make_parser() -> Parser:
     tiles.set_defaults(run=run_tiles)
     add_shared_options(tiles, repeats=5)
     add_sample_counts(tiles)
+    order = commands.add_parser(
+        "order",
+        help="nanoseconds a ray by the order that rays are given in",
+        description="Traces arrays of rays with MLRT's closest_hit and with Embree: those "
+        "of the camera line by line, in Morton order and shuffled, and rays from what they "
+        "hit in random directions.",
+    )
+    order.set_defaults(run=run_order)
+    add_shared_options(order, repeats=5, scenes="office,conference")
     watertight = commands.add_parser(
         "watertight",
         help="rays at vertices and edges of closed meshes, of which none may escape",
@@ -153,9 +163,9 @@ def make_parser() -> Parser:
         "kernels",
         help="exact tests of triangles beside such in single and double precision",
         description="Traces rays from inside of closed meshes with the same traversal and "
-        "three tests of triangles, as MLRT usually does, and with Embree in its default "
-        "and its robust mode, and counts leaks, other hits than the exact ones and errors "
-        "of t.",
+        "five tests of triangles, in each way that MLRT has, and with Embree in its "
+        "default and its robust mode, and counts leaks, wrong hits, hits of other faces "
+        "and errors of t.",
     )
     kernels.set_defaults(run=run_kernels)
     add_shared_options(kernels, repeats=5)
@@ -175,7 +185,10 @@ def make_parser() -> Parser:
         help="of the meshes, 1 to 10: 8 * 4**N faces (%(default)s)",
     )
     kernels.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw speed against leaks there"
+        "--markdown", type=Path, metavar="FILE", help="write all tables there"
+    )
+    kernels.add_argument(
+        "--plot", type=Path, metavar="FILE", help="draw speed against errors there"
     )
     offsets = commands.add_parser(
         "offsets",
@@ -200,6 +213,24 @@ def make_parser() -> Parser:
         help="pixels along both sides of the image (%(default)s)",
     )
     offsets.add_argument(
+        "--source",
+        type=Path,
+        metavar="DIR",
+        help="MLRT's source checkout (the current one)",
+    )
+    readme = commands.add_parser(
+        "readme",
+        help="the results that README.md shows, from the figures that are kept",
+        description="Draws tables and pictures of the results in README.md from the "
+        "figures in compare/results. Nothing is measured.",
+    )
+    readme.set_defaults(run=run_readme, json=None, threads=(1,))
+    readme.add_argument(
+        "--check",
+        action="store_true",
+        help="write nothing; the exit code is 2 if anything is not what the figures say",
+    )
+    readme.add_argument(
         "--source",
         type=Path,
         metavar="DIR",
@@ -241,6 +272,12 @@ def run_tiles(options: argparse.Namespace) -> bool:
     return run(options)
 
 
+def run_order(options: argparse.Namespace) -> bool:
+    from .order_command import run
+
+    return run(options)
+
+
 def run_watertight(options: argparse.Namespace) -> bool:
     from .watertight_command import run
 
@@ -254,12 +291,11 @@ def run_hits(options: argparse.Namespace) -> bool:
 
 
 def run_kernels(options: argparse.Namespace) -> bool:
+    if options.markdown is not None:
+        check_folder_of(options.markdown)
     if options.plot is not None:
-        check_folder_of(options.plot)
-        if importlib.util.find_spec("matplotlib") is None:
-            raise BenchError(
-                "plots need the package matplotlib: pip install 'mlrt[compare]'"
-            )
+        check_plot(options.plot)
+        need_package("matplotlib")
     from .kernels_command import run
 
     return run(options)
@@ -273,6 +309,20 @@ def run_offsets(options: argparse.Namespace) -> bool:
     from .offsets_command import run
 
     return run(options)
+
+
+def run_readme(options: argparse.Namespace) -> bool:
+    need_package("matplotlib")
+    need_package("PIL")
+    from ..readme.command import run
+
+    return run(options)
+
+
+def need_package(name: str) -> None:
+    """Raises BenchError unless what plots and pictures need is installed."""
+    if importlib.util.find_spec(name) is None:
+        raise BenchError(f"plots need the package {name}: pip install 'mlrt[compare]'")
 
 
 def run_frames(options: argparse.Namespace) -> bool:

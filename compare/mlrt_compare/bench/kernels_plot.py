@@ -1,4 +1,4 @@
-"""Speed against leaks, of the figures of `mlrt-bench kernels`."""
+"""Speed against what goes wrong, of the figures of `mlrt-bench kernels`."""
 
 from __future__ import annotations
 
@@ -6,18 +6,26 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+
+from .table import plural
 
 mpl.use("Agg")
 
-LEAST = 0.3
-"""Where no leak stands on the logarithmic axis."""
+MARKS = "os^Dv"
+ERRORS = {
+    "leaks": "leaks per million rays",
+    "wrong_hits": "wrong hits per million rays",
+    "ulps_p99": "error of t in ulps: 99th percentile,\nline to the greatest",
+}
+"""What is drawn upwards, by its name in the figures. Hits of other faces at the same place
+are not among it: at vertices and edges faces tie, and each tracer may choose."""
 
 
 def write_plot(path: Path, figures: dict[str, Any]) -> None:
-    """A panel for what rays are aimed at: Mrays/s over rays per million that leak, a point
-    for each contender and mesh. Of the first number of threads. Other hits are not shown:
-    at vertices and edges faces tie, and each tracer may choose."""
+    """A row of panels for each of ERRORS, a column for what rays are aimed at: the error
+    over Mrays/s, a point for each contender and mesh. Of the first number of threads."""
     threads = figures["settings"]["threads"][0]
     blocks = [
         (scene["name"], block)
@@ -28,36 +36,59 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
     aims = list(dict.fromkeys(block["aim"] for _, block in blocks))
     meshes = list(dict.fromkeys(name for name, _ in blocks))
     names = list(dict.fromkeys(row["name"] for _, block in blocks for row in block["rows"]))
-    colours = mpl.colormaps["tab10"]
-    figure = Figure(figsize=(4 * len(aims) + 4, 4.4), layout="constrained")
-    *panels, last = figure.subplots(1, len(aims) + 1, squeeze=False)[0]
-    for axes, aim in zip(panels, aims, strict=True):
-        for mesh, block in blocks:
-            if block["aim"] != aim:
-                continue
-            for row in block["rows"]:
-                axes.scatter(
-                    max(row["leaks"] / row["rays"] * 1e6, LEAST),
-                    row["rays_per_second"] / 1e6,
-                    color=colours(names.index(row["name"])),
-                    marker="os^Dv"[meshes.index(mesh) % 5],
-                    label=row["name"] if mesh == meshes[0] else None,
-                )
-        axes.set_xscale("log")
-        axes.set_xlim(LEAST / 2, 1.5e6)
-        axes.set_ylim(bottom=0)
+    colours = mpl.colormaps["tab20"]
+    figure = Figure(figsize=(3.6 * len(aims) + 3.6, 9.6), layout="constrained")
+    grid = figure.add_gridspec(len(ERRORS), len(aims) + 1)
+    panels: list[list[Axes]] = []
+    for i in range(len(ERRORS)):
+        panels.append([])
+        for j in range(len(aims)):
+            shared = {"sharex": panels[0][0] if i + j else None}
+            shared["sharey"] = panels[i][0] if j else None
+            panels[i].append(figure.add_subplot(grid[i, j], **shared))
+    draw_shadows(figure.add_subplot(grid[0, -1]), figures, threads, names, colours)
+    for row_of_panels, (error, label) in zip(panels, ERRORS.items(), strict=True):
+        for axes, aim in zip(row_of_panels, aims, strict=True):
+            for mesh, block in blocks:
+                if block["aim"] != aim:
+                    continue
+                for row in block["rows"]:
+                    place = names.index(row["name"])
+                    mark = MARKS[meshes.index(mesh) % len(MARKS)]
+                    draw_row(axes, row, error, color=colours(place % 20), marker=mark)
+            axes.set(xscale="log")
+            axes.set_yscale("symlog", linthresh=1)
+            axes.grid(True, alpha=0.25)
+        row_of_panels[0].set_ylim(-0.4, max(2 * row_of_panels[0].get_ylim()[1], 10))
+        row_of_panels[0].set_ylabel(label)
+    for axes, aim in zip(panels[0], aims, strict=True):
         axes.set_title(f"rays at {aim}")
-        axes.set_xlabel("leaks per million rays (left edge: none)")
-    draw_shadows(last, figures, threads, names, colours)
-    panels[0].set_ylabel(f"Mrays/s, {threads} thread{'s' if threads > 1 else ''}")
-    panels[-1].legend(fontsize="small")
-    marks = ", ".join(f"{'os^Dv'[i % 5]} {mesh}" for i, mesh in enumerate(meshes))
-    figure.suptitle(f"What exact tests of triangles cost and give ({marks})", fontsize=10)
+    for axes in panels[-1]:
+        axes.set_xlabel(f"Mrays/s, {plural(threads)}")
+    tests = [
+        axes.scatter([], [], color=colours(place % 20), label=name)
+        for place, name in enumerate(names)
+    ]
+    marks = [
+        axes.scatter([], [], color="black", marker=mark, label=mesh)
+        for mesh, mark in zip(meshes, MARKS, strict=False)
+    ]
+    figure.legend(handles=tests, loc="outside lower center", ncols=5, fontsize=9)
+    figure.legend(handles=marks, loc="outside upper center", ncols=5, fontsize=9)
     figure.savefig(path, dpi=100)
 
 
+def draw_row(axes: Axes, row: dict[str, Any], error: str, **style: Any) -> None:
+    rate = row["rays_per_second"] / 1e6
+    if error == "ulps_p99":
+        axes.scatter(rate, row["ulps_p99"], **style, s=28, alpha=0.85)
+        axes.plot([rate, rate], [row["ulps_p99"], row["ulps_max"]], color=style["color"])
+    else:
+        axes.scatter(rate, 1e6 * row[error] / row["rays"], **style, s=28, alpha=0.85)
+
+
 def draw_shadows(
-    axes: Any, figures: dict[str, Any], threads: int, names: list[str], colours: Any
+    axes: Axes, figures: dict[str, Any], threads: int, names: list[str], colours: Any
 ) -> None:
     """Mrays/s of shadow rays over pixels that are wrong, of all sizes of the scene: full
     marks for robust offsets, empty ones for Mitsuba's."""
@@ -70,15 +101,17 @@ def draw_shadows(
             if (other["name"], other["offset"]) == (row["name"], row["offset"])
         ]
         wrong = sum(other["acne"] + other["leaks"] for other in same)
-        colour = colours(names.index(row["name"]))
+        colour = colours(names.index(row["name"]) % 20)
         axes.scatter(
-            max(wrong, LEAST),
+            wrong,
             row["rays_per_second"] / 1e6,
             edgecolors=[colour],
             facecolors=[colour] if row["offset"] == "robust" else "none",
         )
-    axes.set_xscale("log")
-    axes.set_xlim(left=LEAST / 2)
+    axes.set_xscale("symlog", linthresh=1)
+    axes.set_xlim(left=-0.4)
     axes.set_ylim(bottom=0)
+    axes.grid(True, alpha=0.25)
+    axes.set_ylabel("Mrays/s")
     axes.set_title("shadow rays (full: robust offsets)")
-    axes.set_xlabel("pixels with acne or leaks (left edge: none)")
+    axes.set_xlabel("pixels with acne or leaks")

@@ -10,6 +10,9 @@ from typing import NoReturn
 
 from .errors import BenchError
 
+PLOTS = (".png", ".svg", ".pdf")
+"""Kinds of images that plots are written as."""
+
 
 class Parser(argparse.ArgumentParser):
     """Reports a wrong call in one sentence, with the exit code for what could not run."""
@@ -115,8 +118,18 @@ def check_json(path: Path | None) -> None:
 
 
 def check_folder_of(path: Path) -> None:
-    if not path.absolute().parent.is_dir():
+    folder = path.absolute().parent
+    if not folder.is_dir():
         raise BenchError(f"there is no folder {path.parent} to write {path} to")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise BenchError(f"there is no permission to write {path}: name another folder")
+
+
+def check_plot(path: Path) -> None:
+    """Raises BenchError for a file that a plot could not be written to after the work."""
+    if path.suffix not in PLOTS:
+        raise BenchError(f"the plot {path} must be one of {', '.join(PLOTS)}")
+    check_folder_of(path)
 
 
 def check_threads(threads: Sequence[int]) -> None:

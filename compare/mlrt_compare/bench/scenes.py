@@ -187,6 +187,18 @@ def camera_fields(camera: Camera) -> dict[str, Any]:
     }
 
 
+def camera_of(view: dict[str, Any]) -> Camera:
+    """Of the fields that `camera_fields` gives."""
+    return Camera(
+        origin=tuple(view["origin"]),
+        axes=(tuple(view["axis_x"]), tuple(view["axis_y"]), tuple(view["axis_z"])),
+        tan_half_fov_x=view["tan_half_fov_x"],
+        near_clip=view["near_clip"],
+        far_clip=view["far_clip"],
+        principal_point_offset=(view["principal_point_x"], view["principal_point_y"]),
+    )
+
+
 def light_position(arrays: SceneArrays, name: str) -> tuple[float, ...]:
     """Of the first point or spot light, else the centroid of the first area light.
 

@@ -5,16 +5,14 @@ Whatever a grouping costs, it must find the same hits.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from mlrt_plugin.scene_arrays import Camera
-
+from ..bench.camera_rays import Rays, camera_rays, morton_order
 from ..bench.status import show_status
-from .counts import counts_of
+from .counts import PACKET_RAYS, counts_of
 from .scenes import StudiedScene
 from .ways import PACKET, PACKET_WITHOUT, PAPER, WITHOUT
 
@@ -23,48 +21,11 @@ BEFORE_THE_HIT = 1 - 2.0**-10
 """Where shadow rays end, of their length, so that they do not meet what was hit; chosen."""
 SEED = 1
 TILE_RAYS, RANDOM_RAYS = 2**14, 2**11
-"""Traced in random order within tiles, and from anywhere; chosen. One interval for rays
-that go apart visits most of the tree, so that few must do."""
-
-
-@dataclass(frozen=True)
-class Rays:
-    """Rays from one point.
-
-    origin: (3,); directions: (N, 3); t_min, t_max: (N,); all float32, in scene units.
-    """
-
-    origin: npt.NDArray[np.float32]
-    directions: npt.NDArray[np.float32]
-    t_min: npt.NDArray[np.float32]
-    t_max: npt.NDArray[np.float32]
-
-    def ordered(self, order: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.float32], ...]:
-        """Arguments of a query of the native core."""
-        origins = np.ascontiguousarray(np.broadcast_to(self.origin, (len(order), 3)))
-        return (
-            origins,
-            np.ascontiguousarray(self.directions[order]),
-            np.ascontiguousarray(self.t_min[order]),
-            np.ascontiguousarray(self.t_max[order]),
-        )
-
-
-def camera_rays(camera: Camera, side: int) -> Rays:
-    """Through the centres of the pixels of a square film, row by row (Mitsuba's
-    perspective.cpp: x points to the left)."""
-    x_axis, y_axis, z_axis = np.array(camera.axes, np.float64)
-    place = 1 - 2 * (np.arange(side) + 0.5) / side
-    x = (place - 2 * camera.principal_point_offset[0]) * camera.tan_half_fov_x
-    y = (place - 2 * camera.principal_point_offset[1]) * camera.tan_half_fov_x
-    directions = z_axis + x[None, :, None] * x_axis + y[:, None, None] * y_axis
-    count = side * side
-    return Rays(
-        np.array(camera.origin, np.float32),
-        directions.reshape(count, 3).astype(np.float32),
-        np.full(count, camera.near_clip, np.float32),
-        np.full(count, camera.far_clip, np.float32),
-    )
+"""Traced at most in random order within tiles, and from anywhere; chosen. One interval for
+rays that go apart visits most of the tree, so that few must do."""
+TILE_WORK, RANDOM_WORK, LEAST_RAYS = 2**33, 2**30, 2**8
+"""Rays times triangles of these groups, where that is not fewer than the least; chosen, so
+that millions of triangles take seconds."""
 
 
 def shadow_rays(
@@ -79,31 +40,28 @@ def shadow_rays(
     return Rays(light, directions, np.zeros_like(t_max), t_max)
 
 
-def groupings(side: int, tile: int, seed: int) -> dict[str, npt.NDArray[np.int64]]:
+def groupings(
+    side: int, tile: int, seed: int, triangles: int
+) -> dict[str, npt.NDArray[np.int64]]:
     """Orders of pixels of a square film, by name: all of them with neighbours together, in
     Morton order; tiles that are chosen at random, the rays of each in random order; and
     rays that are chosen at random.
 
-    tile: rays along the side of a tile.
+    tile: rays along the side of a tile. triangles: of the scene; the more, the fewer rays
+    in random groups.
     """
     random = np.random.default_rng(seed)
     neighbours = morton_order(side)
     tiles = neighbours[: len(neighbours) // tile**2 * tile**2].reshape(-1, tile**2)
-    chosen = random.permutation(tiles)[: max(TILE_RAYS // tile**2, 1)]
+    of_tiles = min(TILE_RAYS, TILE_WORK // triangles)
+    anywhere = min(RANDOM_RAYS, max(RANDOM_WORK // triangles, LEAST_RAYS))
+    anywhere -= anywhere % PACKET_RAYS
+    chosen = random.permutation(tiles)[: max(of_tiles // tile**2, 1)]
     return {
         "neighbours": neighbours,
         "random within tiles": random.permuted(chosen, axis=1).ravel(),
-        "random": random.permutation(neighbours)[:RANDOM_RAYS],
+        "random": random.permutation(neighbours)[:anywhere],
     }
-
-
-def morton_order(side: int) -> npt.NDArray[np.int64]:
-    """Numbers of the pixels of a square film, row by row, in Morton order."""
-    row, column = np.divmod(np.arange(side * side, dtype=np.int64), side)
-    code = np.zeros_like(row)
-    for bit in range(16):
-        code |= (column >> bit & 1) << 2 * bit | (row >> bit & 1) << 2 * bit + 1
-    return np.argsort(code, kind="stable")
 
 
 def compare_groupings(studied: StudiedScene) -> dict[str, Any]:
@@ -120,7 +78,8 @@ def compare_groupings(studied: StudiedScene) -> dict[str, Any]:
     same = True
     result: dict[str, Any] = {}
     tile = min(int(PAPER.options["minimum_tile"]), studied.side)
-    for name, order in groupings(studied.side, tile, SEED).items():
+    triangles = len(studied.scene.faces)
+    for name, order in groupings(studied.side, tile, SEED, triangles).items():
         result[name] = {"rays": len(order), "ways": {}}
         for way in WAYS:
             show_status(f"{studied.scene.name}: {name}, {way.name}")

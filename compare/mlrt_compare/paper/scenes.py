@@ -11,7 +11,6 @@ import numpy as np
 
 from mlrt_plugin.render import PreparedScene, prepare
 from mlrt_plugin.scene_arrays import (
-    Camera,
     Emitter,
     Film,
     Lighting,
@@ -20,7 +19,13 @@ from mlrt_plugin.scene_arrays import (
 )
 
 from ..bench.errors import BenchError
-from ..bench.scenes import BenchScene, SceneSource, chosen_scenes, usual_scenes
+from ..bench.scenes import (
+    BenchScene,
+    SceneSource,
+    camera_of,
+    chosen_scenes,
+    usual_scenes,
+)
 
 USUAL = ("office", "conference", "building", "dragon")
 LARGE_DRAGON = "dragon-7.2M"
@@ -60,17 +65,6 @@ def arrays_of(scene: BenchScene, side: int, *, light: bool) -> SceneArrays:
         base_seed=0,
         features=(),
         warnings=(),
-    )
-
-
-def camera_of(view: dict[str, Any]) -> Camera:
-    return Camera(
-        origin=tuple(view["origin"]),
-        axes=(tuple(view["axis_x"]), tuple(view["axis_y"]), tuple(view["axis_z"])),
-        tan_half_fov_x=view["tan_half_fov_x"],
-        near_clip=view["near_clip"],
-        far_clip=view["far_clip"],
-        principal_point_offset=(view["principal_point_x"], view["principal_point_y"]),
     )
 
 

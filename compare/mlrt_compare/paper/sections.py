@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from ..bench.markdown import table
 from ..bench.table import number, plural
 from .grouping import WAYS
-from .markdown_tables import table
 from .published import PUBLISHED
 from .ways import PAPER, TIMED, WITHOUT
 

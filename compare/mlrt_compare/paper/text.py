@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .markdown_tables import row
+from ..bench.markdown import row
 from .published import PUBLISHED, PublishedCounts
 from .sections import culling_lines, grouping_lines, rate_lines, tile_lines, tree_lines
 from .study import measured, sound
