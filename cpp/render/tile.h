@@ -6,6 +6,7 @@
 #include "base/counters.h"
 #include "mlrta/trace.h"
 #include "render/camera_samples.h"
+#include "render/hit_packet.h"
 #include "render/picture_film.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
@@ -15,7 +16,6 @@
 #include "render/spread_samples.h"
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 namespace mlrt {

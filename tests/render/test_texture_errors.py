@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import render_scenes
 from core_scene import scene_arguments
+from object_sets import object_set
 
 from mlrt_plugin._dispatch import core
 
@@ -134,3 +135,15 @@ def test_textures_need_faces(folder: Path) -> None:
     arguments["material_textures"] = np.zeros((count, 3), np.uint32)
     with pytest.raises(ValueError, match="has textures, but faces are empty"):
         core.Scene(**arguments)
+
+
+def test_textures_need_faces_of_the_tree(folder: Path) -> None:
+    arguments = arguments_with(folder, [CONSTANT])
+    count = sum(shape["face_count"] for shape in arguments["shapes"])
+    ball = {"first_face": count, "face_count": 1, "material": 0}
+    arguments["shapes"] = [*arguments["shapes"], ball]
+    arguments["objects"] = object_set([0], [np.eye(3, 4)], first_face=count)
+    message = "has textures, but its faces are not in the tree"
+    with pytest.raises(ValueError, match=message):
+        core.Scene(**arguments)
+    core.Scene(**arguments | {"material_textures": None})
