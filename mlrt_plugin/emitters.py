@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
-from .scene_arrays import NONE, Emitter, SceneArrays, Vec3, no_environment
+from .scene_arrays import Emitter, SceneArrays, Vec3, no_environment
+from .shape_arrays import NONE
 
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))

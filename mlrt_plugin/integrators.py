@@ -30,14 +30,14 @@ MISSING = {
 """What an integrator computes and `direct` does not."""
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
-UNHITTABLE = ("point", "spot", "directional", "projector")
-"""Emitters that no ray meets, so that BSDF samples find nothing of them."""
 NO_BSDF_SAMPLES = (
     "BSDF samples are not taken, so lights that have an area or are all around are noisier "
     "or less noisy than in Mitsuba; the expected image is the same"
 )
 POINTLIKE = ("point", "spot", "directional")
-"""Emitters that rays cannot hit."""
+"""Emitters whose light comes from one direction at each point."""
+UNHITTABLE = (*POINTLIKE, "projector")
+"""Emitters that no ray meets, so that BSDF samples find nothing of them."""
 MOST_EMITTER_SAMPLES = 256
 """Of a camera sample, natively; chosen, as memory grows with them."""
 OWN_PARAMETERS = (

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from . import mitsuba_objects as objects
 from .elements import Element, from_object
 from .errors import UnsupportedFeature
-from .scene_arrays import NONE, Vec3
+from .scene_arrays import Vec3
+from .shape_arrays import NONE
 from .textures import Surface, TextureTable, child_of
 
 BLACK: Vec3 = (0.0, 0.0, 0.0)

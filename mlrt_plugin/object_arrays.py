@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .scene_arrays import Shape
+from .shape_arrays import Shape
 
 ANALYTIC_TYPES = ("sphere", "disk", "cylinder")
 """In the order of `AnalyticType` of the core's ``geometry/analytic_shape.h``."""

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .object_arrays import ObjectArrays
-from .scene_arrays import Shape, Vec3
+from .scene_arrays import Vec3
+from .shape_arrays import Shape
 from .tree import ray_arrays, trace_options
 from .tree_cache import obtain_tree
 

@@ -18,6 +18,7 @@ import mitsuba as mi
 from .elements import Element, from_state
 from .errors import SceneError, one_sentence
 from .mesh_files import bad_vertices
+from .threads import threads_for_files
 
 READING_VARIANT = "scalar_rgb"
 
@@ -306,7 +307,7 @@ def numbered(parsed: ParsedScene) -> dict[str, Element]:
 
 def loaded(parsed: ParsedScene) -> Any:
     """The object that the root of a parsed scene describes; raises SceneError."""
-    with resolving_by(parsed.resolver):
+    with resolving_by(parsed.resolver), threads_for_files():
         return reported(
             lambda: mi.parser.instantiate(parsed.config, parsed.state),
             parsed.name,

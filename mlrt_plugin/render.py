@@ -25,9 +25,10 @@ from .options import (
     split_options,
 )
 from .samplers import checked_spp, own_spp, possible_spp, rounded
-from .scene_arrays import Lighting, SceneArrays, Shape, same_geometry
+from .scene_arrays import Lighting, SceneArrays, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
+from .shape_arrays import Shape
 from .texture_arrays import fields_of
 from .threads import thread_count
 from .tree_cache import ObtainedTree, obtain_tree

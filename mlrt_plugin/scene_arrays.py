@@ -9,18 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
+from .object_arrays import ObjectArrays
+from .shape_arrays import NONE, Shape
 from .texture_arrays import Texture
-
-if TYPE_CHECKING:
-    from .object_arrays import ObjectArrays
-
-NONE = 0xFFFFFFFF
-"""Marks the absence of a material, emitter or shape."""
 
 Vec2 = tuple[float, float]
 Vec3 = tuple[float, float, float]
@@ -49,19 +45,6 @@ def same_geometry(one: HasGeometry, other: HasGeometry) -> bool:
     return np.array_equal(one.faces, other.faces) and np.array_equal(
         one.vertices.view(np.uint32), other.vertices.view(np.uint32)
     )
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A run of faces that share a material and an emitter."""
-
-    first_face: int
-    face_count: int
-    material: int = NONE
-    emitter: int = NONE
-    vertex_normals: bool = False
-    flip_normals: bool = False
-    texture_coordinates: bool = False
 
 
 @dataclass(frozen=True)

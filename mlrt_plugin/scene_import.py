@@ -27,7 +27,8 @@ from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
-from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
+from .scene_arrays import Feature, Lighting, SceneArrays
+from .shape_arrays import NONE, Shape
 from .texture_coordinates import gather_coordinates
 from .textures import Surface
 

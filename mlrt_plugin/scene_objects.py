@@ -14,7 +14,7 @@ from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError
 from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
-from .scene_arrays import NONE, Shape
+from .shape_arrays import NONE, Shape
 
 GROUP = "ShapeGroupPlugin"
 """Mitsuba's class of the plugin `shapegroup`."""

@@ -34,3 +34,11 @@ def thread_count(count: int | None) -> Iterator[None]:
         yield
     finally:
         dr.set_thread_count(before)
+
+
+@contextmanager
+def threads_for_files() -> Iterator[None]:
+    """Runs with two threads at least. With one, Mitsuba 3.9.1 waits for ever when it reads
+    an OpenEXR file: it leaves the decoding to another thread."""
+    with thread_count(2 if dr.thread_count() < 2 else None):
+        yield

@@ -10,6 +10,7 @@ import mitsuba
 
 from mlrt_plugin.errors import SceneError, one_sentence
 from mlrt_plugin.parsing import resolving_from
+from mlrt_plugin.threads import threads_for_files
 
 from .settings import Settings
 
@@ -68,7 +69,8 @@ def _loaded(
             for node in state.nodes
         )
         mi.parser.transform_all(config, state)
-        scene = mi.parser.instantiate(config, state)
+        with threads_for_files():
+            scene = mi.parser.instantiate(config, state)
     if settings.resolution is not None:
         for sensor in scene.sensors():
             _resize(sensor, settings.resolution)

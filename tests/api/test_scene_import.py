@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 import scene_files
 
-from mlrt_plugin.scene_arrays import NONE, Camera
+from mlrt_plugin.scene_arrays import Camera
 from mlrt_plugin.scene_import import import_scene
+from mlrt_plugin.shape_arrays import NONE
 
 SceneFile = Callable[..., Path]
 

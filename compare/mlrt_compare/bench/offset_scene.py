@@ -7,14 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from mlrt_plugin.scene_arrays import (
-    Camera,
-    Emitter,
-    Film,
-    Lighting,
-    SceneArrays,
-    Shape,
-)
+from mlrt_plugin.scene_arrays import Camera, Emitter, Film, Lighting, SceneArrays
+from mlrt_plugin.shape_arrays import Shape
 
 LIGHTS = ("point", "area", "directional")
 Doubles = npt.NDArray[np.float64]

@@ -18,8 +18,9 @@ import numpy.typing as npt
 
 from mlrt_plugin.errors import MlrtError
 from mlrt_plugin.image_files import replacing
-from mlrt_plugin.scene_arrays import NONE, Camera, SceneArrays
+from mlrt_plugin.scene_arrays import Camera, SceneArrays
 from mlrt_plugin.scene_import import import_scene
+from mlrt_plugin.shape_arrays import NONE
 
 from .errors import BenchError
 

@@ -10,13 +10,8 @@ from typing import Any
 import numpy as np
 
 from mlrt_plugin.render import PreparedScene, prepare
-from mlrt_plugin.scene_arrays import (
-    Emitter,
-    Film,
-    Lighting,
-    SceneArrays,
-    Shape,
-)
+from mlrt_plugin.scene_arrays import Emitter, Film, Lighting, SceneArrays
+from mlrt_plugin.shape_arrays import Shape
 
 from ..bench.errors import BenchError
 from ..bench.scenes import (
