@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from .elements import Element
 from .features import REFUSED, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
+from .materials import DELTA
 from .scene_arrays import Lighting
+from .textures import VARYING
 
 MITSUBA = "3.9.1"
 PLUGINS = {
@@ -51,10 +53,19 @@ PLUGINS = {
     ),
 }
 """All plugins of Mitsuba, by the kind of object that they make."""
+NO_LIGHT_SAMPLE = (
+    "black for light samples; by Mitsuba where BSDF samples can find lights in it"
+)
+HIT_BY_MITSUBA = "where Mitsuba shades, it also finds the hits"
+ON_MESHES = "on materials of meshes that are not instanced; else by Mitsuba"
 REMARKS = {
-    ("bsdf", "twosided"): "of `diffuse`; with others by Mitsuba",
-    ("bsdf", "diffuse"): "in constant colours; with textures by Mitsuba",
-    ("emitter", "area"): "on meshes, in constant colours; else by Mitsuba",
+    ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
+    ("bsdf", "diffuse"): "in constant colours and with native textures",
+    ("bsdf", "mask"): "of native materials, on meshes that are not instanced; shadow rays "
+    "stop at it, as in `direct`; by Mitsuba where BSDF samples can find lights through it",
+    **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in DELTA},
+    **{("texture", plugin): ON_MESHES for plugin in VARYING},
+    ("emitter", "area"): "in constant colours; with textures by Mitsuba",
     ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
     ("emitter", "projector"): "its picture is looked up like a texture of a surface",
@@ -65,8 +76,12 @@ REMARKS = {
     "`--force-direct`",
     ("integrator", "moment"): "by Mitsuba, around one `direct` or `path` with `max_depth` "
     "2; else `--force-direct`",
-    ("shape", "shapegroup"): "shading; of meshes alone it is in the tree",
-    ("shape", "instance"): "shading; of meshes it is written out and in the tree",
+    ("shape", "shapegroup"): "a tree of its own; where Mitsuba shades, see `instance`",
+    ("shape", "instance"): "where Mitsuba shades, of meshes it is written out into the "
+    "tree, and Mitsuba hits others",
+    ("shape", "sphere"): HIT_BY_MITSUBA,
+    ("shape", "disk"): HIT_BY_MITSUBA,
+    ("shape", "cylinder"): HIT_BY_MITSUBA,
     ("shape", "merge"): "shading; its meshes are in the tree",
     ("shape", "blender"): "shading; its mesh is in the tree; not tested, as it takes "
     "addresses in Blender's memory",

@@ -16,7 +16,10 @@ from . import mitsuba_objects as objects
 
 @dataclass
 class Element:
-    """One plugin of the scene: ``kind`` is Mitsuba's type of object in lower case."""
+    """One plugin of the scene: ``kind`` is Mitsuba's type of object in lower case.
+
+    loaded: whether it was an object already, which shows none of its properties.
+    """
 
     kind: str
     plugin: str
@@ -24,6 +27,7 @@ class Element:
     where: str = ""
     properties: dict[str, Any] = field(default_factory=dict)
     children: list[tuple[str, Element]] = field(default_factory=list)
+    loaded: bool = False
 
     def children_of(self, kind: str) -> Iterator[Element]:
         return (child for _, child in self.children if child.kind == kind)
@@ -130,16 +134,19 @@ def from_state(state: Any) -> list[Element]:
 def from_object(instance: Any, fallback_id: str = "") -> Element:
     """The element of a loaded object with what it shows of its insides."""
     kind = kind_of(instance)
-    element = Element(kind, objects.plugin_name(instance), instance.id() or fallback_id)
+    plugin = objects.plugin_name(instance)
+    element = Element(kind, plugin, instance.id() or fallback_id, loaded=True)
     if kind == "shape":
         nested = {"bsdf": instance.bsdf(), "emitter": instance.emitter()}
         nested["interior"] = instance.interior_medium()
         nested["exterior"] = instance.exterior_medium()
+        if element.plugin == "instance":
+            element.properties["loaded"] = True
     elif kind == "sensor":
         nested = {"film": instance.film(), "sampler": instance.sampler()}
     elif kind == "film":
         nested = {"rfilter": instance.rfilter()}
-    elif kind in ("bsdf", "emitter"):
+    elif kind in ("bsdf", "emitter") or plugin == "checkerboard":
         nested = {k: v for k, v in objects.members(instance).items()}
     else:
         nested = {}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
-from .scene_arrays import NONE, Emitter, SceneArrays, Vec3
+from .scene_arrays import NONE, Emitter, SceneArrays, Vec3, no_environment
 
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
@@ -104,6 +104,17 @@ def read_emitter(
         f"{name} is not supported: only point, spot, directional, area, constant and "
         "envmap are so far"
     )
+
+
+def environment_of(
+    sources: Iterable[Any], name_of: Callable[[Any], str]
+) -> npt.NDArray[np.float32]:
+    """The picture of the emitter that is an `envmap`; without pixels if none is. See
+    `read_environment`."""
+    for source in sources:
+        if objects.plugin_name(source) == "envmap":
+            return read_environment(source, name_of(source))
+    return no_environment()
 
 
 def read_environment(emitter: Any, name: str) -> npt.NDArray[np.float32]:

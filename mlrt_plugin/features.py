@@ -10,16 +10,21 @@ import numpy as np
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import UnsupportedFeature
+from .materials import DELTA
+from .object_arrays import ANALYTIC_TYPES
 from .scene_arrays import Feature
+from .textures import VARYING
 
-SHAPES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
-BSDFS = ("diffuse", "twosided")
+MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
+SHAPES = (*MESHES, *ANALYTIC_TYPES, "shapegroup", "instance")
+BSDFS = ("diffuse", "twosided", "mask", *DELTA)
 EMITTERS = ("point", "spot", "directional", "area", "constant", "envmap")
 SENSORS = ("perspective", "thinlens", "orthographic")
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
+TEXTURES = (*CONSTANT_TEXTURES, *VARYING)
 
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
 REFUSED = {
@@ -41,7 +46,7 @@ NATIVE = {
     "film": FILMS,
     "rfilter": FILTERS,
     "sampler": SAMPLERS,
-    "texture": CONSTANT_TEXTURES,
+    "texture": TEXTURES,
 }
 
 
@@ -71,6 +76,15 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    textures = [child.plugin for child in element.children_of("texture")]
+    if kind == "emitter" and set(textures) & set(VARYING):
+        return "textures of lights are not supported yet"
+    if kind == "shape" and textures:
+        return "textures that are attributes of a shape are not supported yet"
+    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
+        return "textures and masks on it are not supported yet"
+    if plugin == "instance" and element.properties.get("loaded"):
+        return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
         return "only arrays of strength 2 are supported so far"
     if plugin == "orthographic" and shears(element.properties.get("to_world")):
@@ -80,10 +94,23 @@ def reason_against(element: Element) -> str:
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
-        child.plugin != "diffuse" for child in element.children_of("bsdf")
+        child.plugin not in ("diffuse", "conductor")
+        for child in element.children_of("bsdf")
     ):
-        return "only diffuse materials can be nested in it so far"
+        return "only diffuse materials and conductors can be nested in it so far"
+    if plugin == "mask" and any(c.plugin == "mask" for c in element.children_of("bsdf")):
+        return "a mask in a mask is not supported yet"
     return ""
+
+
+def has_varying_parts(shape: Element) -> bool:
+    """Whether something about a shape, or a group of them, varies over its surface."""
+    return any(
+        part.plugin not in CONSTANT_TEXTURES
+        if part.kind == "texture"
+        else part.kind == "bsdf" and part.plugin == "mask"
+        for part in shape.walk()
+    )
 
 
 def shears(to_world: Any) -> bool:

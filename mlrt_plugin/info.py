@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import mlrt_llvm
 
 from .errors import SceneError
-from .features import REFUSED
+from .features import MESHES, REFUSED
 from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
 from .scene_import import SceneSource, SceneSummary, import_scene, summarise
 from .shading_choice import choice_for
@@ -69,7 +69,7 @@ def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) ->
     if not path_is_native:
         if (kind, plugin) in REFUSED:
             return "not supported"
-        return "hits native" if kind == "shape" and is_native else "by Mitsuba"
+        return "hits native" if kind == "shape" and plugin in MESHES else "by Mitsuba"
     return "native" if is_native else "not supported"
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
+from .materials import DELTA
 from .options import INTEGRATOR_OPTIONS
 from .scene_arrays import Feature, Lighting
 
@@ -29,6 +30,8 @@ MISSING = {
 """What an integrator computes and `direct` does not."""
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
+UNHITTABLE = ("point", "spot", "directional", "projector")
+"""Emitters that no ray meets, so that BSDF samples find nothing of them."""
 NO_BSDF_SAMPLES = (
     "BSDF samples are not taken, so lights that have an area or are all around are noisier "
     "or less noisy than in Mitsuba; the expected image is the same"
@@ -204,6 +207,15 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
             f"{MOST_EMITTER_SAMPLES} are taken natively: raise the samples per pixel "
             "instead"
         )
+    if lighting.bsdf_samples > 0 and any(
+        f.kind == "emitter" and f.plugin not in UNHITTABLE for f in features
+    ):
+        passing = [f for f in features if f.kind == "bsdf" and f.plugin in (*DELTA, "mask")]
+        if passing:
+            return (
+                f"lights in {passing[0]} are found by BSDF samples only, which {name} asks "
+                "for and which are not taken natively"
+            )
     return ""
 
 

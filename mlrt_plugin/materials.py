@@ -2,49 +2,108 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import mitsuba_objects as objects
+from .elements import Element, from_object
 from .errors import UnsupportedFeature
-from .scene_arrays import Vec3
+from .scene_arrays import NONE, Vec3
+from .textures import Surface, TextureTable, child_of
 
 BLACK: Vec3 = (0.0, 0.0, 0.0)
+DELTA = ("conductor", "dielectric", "thindielectric", "null")
+"""BSDFs that no light sample finds, so that direct light leaves them black; what they
+mirror or let through is found by BSDF samples."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """What one side of a surface reflects: a colour, or the number of a texture."""
+
+    colour: Vec3 = BLACK
+    texture: int = NONE
+
+
+@dataclass(frozen=True)
+class Material:
+    """Both sides, and the texture of the share of light that they reflect at all."""
+
+    front: Side = Side()
+    back: Side = Side()
+    opacity: int = NONE
 
 
 class MaterialTable:
     """Collects materials; equal ones share a row."""
 
     def __init__(self) -> None:
-        self._rows: dict[tuple[Vec3, Vec3], int] = {}
+        self.textures = TextureTable()
+        self._rows: dict[Material, int] = {}
 
-    def add(self, bsdf: Any, owner: str) -> int:
-        """Number of the row of a loaded BSDF; ``owner`` names its shape in messages."""
-        row = reflectances(bsdf, owner)
-        return self._rows.setdefault(row, len(self._rows))
+    def add(self, surface: Surface, elements: Mapping[str, Element]) -> int:
+        """Number of the row of the material of a shape; `elements` are what the scene says,
+        by the ids of objects. Raises what `TextureTable.add_colour` does."""
+        bsdf = surface.shape.bsdf()
+        element = elements.get(bsdf.id()) or from_object(bsdf)
+        material = self._read(bsdf, element, surface)
+        return self._rows.setdefault(material, len(self._rows))
 
     def array(self) -> npt.NDArray[np.float32]:
-        """(M, 2, 3) linear RGB reflectances, front and back."""
-        return np.array(list(self._rows), np.float32).reshape(-1, 2, 3)
+        """(M, 2, 3) linear RGB reflectances, front and back; black where there are
+        textures."""
+        rows = [(m.front.colour, m.back.colour) for m in self._rows]
+        return np.array(rows, np.float32).reshape(-1, 2, 3)
 
+    def texture_array(self) -> npt.NDArray[np.uint32]:
+        """(M, 3) numbers of the textures of front, back and opacity, or NONE."""
+        rows = [(m.front.texture, m.back.texture, m.opacity) for m in self._rows]
+        return np.array(rows, np.uint32).reshape(-1, 3)
 
-def reflectances(bsdf: Any, owner: str) -> tuple[Vec3, Vec3]:
-    """Reflectance of the front and of the back of a BSDF.
+    def uses_coordinates(self) -> list[bool]:
+        """Which rows depend on the texture coordinates of the surface."""
+        return [
+            any(self.textures.uses_coordinates(int(number)) for number in row)
+            for row in self.texture_array()
+        ]
 
-    Raises UnsupportedFeature unless it is diffuse, or a twosided of diffuse ones, in
-    constant colours.
-    """
-    plugin = objects.plugin_name(bsdf)
-    if plugin == "diffuse":
-        return objects.color(
-            objects.members(bsdf)["reflectance"], f"bsdf of {owner}"
-        ), BLACK
-    if plugin == "twosided":
-        sides = objects.members(bsdf)
-        front = reflectances(sides["brdf_0"], owner)[0]
-        return front, reflectances(sides.get("brdf_1", sides["brdf_0"]), owner)[0]
-    raise UnsupportedFeature(
-        f"bsdf '{plugin}' of {owner} is not supported: only diffuse and twosided are so far"
-    )
+    def _read(self, bsdf: Any, element: Element, surface: Surface) -> Material:
+        plugin = objects.plugin_name(bsdf)
+        if plugin in DELTA:
+            return Material()
+        parts = objects.members(bsdf)
+        if plugin == "diffuse":
+            return Material(self._side(parts["reflectance"], element, surface))
+        if plugin == "twosided":
+            nested = list(element.children_of("bsdf"))
+            sides = [parts["brdf_0"], parts.get("brdf_1", parts["brdf_0"])]
+            front, back = (
+                self._read(side, nested[min(i, len(nested) - 1)], surface).front
+                if nested
+                else self._read(side, element, surface).front
+                for i, side in enumerate(sides)
+            )
+            return Material(front, back)
+        if plugin == "mask":
+            inner = next(element.children_of("bsdf"), element)
+            material = self._read(parts["nested_bsdf"], inner, surface)
+            opacity = parts["opacity"]
+            number = self.textures.add_scalar(
+                opacity, child_of(element, "opacity", opacity), surface
+            )
+            return Material(material.front, material.back, number)
+        raise UnsupportedFeature(
+            f"bsdf '{plugin}' of {surface.name} is not supported: only diffuse, twosided, "
+            f"mask, {', '.join(DELTA)} are so far"
+        )
+
+    def _side(self, reflectance: Any, element: Element, surface: Surface) -> Side:
+        """Of a material `diffuse`."""
+        if objects.plugin_name(reflectance) in ("uniform", "srgb"):
+            return Side(objects.color(reflectance, f"bsdf of {surface.name}"))
+        child = child_of(element, "reflectance", reflectance)
+        return Side(texture=self.textures.add_colour(reflectance, child, surface))

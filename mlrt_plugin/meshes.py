@@ -24,6 +24,7 @@ class Geometry:
     faces: npt.NDArray[np.uint32]
     normals: npt.NDArray[np.float32]
     first_faces: list[int]
+    first_vertices: list[int]
     face_counts: list[int]
     vertex_normals: list[bool]
     flip_normals: list[bool]
@@ -40,6 +41,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
     """
     vertices, faces, normals = [], [], []
     interpolated, flipped, first_faces, not_finite = [], [], [], []
+    first_vertices = []
     warnings: list[str] = []
     vertex_count = face_count = 0
     for shape, name in zip(shapes, names, strict=True):
@@ -72,6 +74,7 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
             warnings.append(warning)
         not_finite.append(dropped)
         first_faces.append(face_count)
+        first_vertices.append(vertex_count)
         vertices.append(points)
         faces.append(corners + np.uint32(vertex_count))
         normals.append(directions)
@@ -79,6 +82,9 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         flipped.append(bool(shape.has_flipped_normals()))
         vertex_count += len(points)
         face_count += len(corners)
+    if not shapes:
+        vertices = normals = [np.zeros((0, 3), np.float32)]
+        faces = [np.zeros((0, 3), np.uint32)]
     if vertex_count > 0xFFFFFFFF:
         raise SceneError(
             f"the scene has {vertex_count} vertices, more than 2**32: split it"
@@ -90,12 +96,22 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         if any(interpolated)
         else np.zeros((0, 3), np.float32),
         first_faces=first_faces,
-        face_counts=[len(f) for f in faces],
+        first_vertices=first_vertices,
+        face_counts=[len(f) for f in faces] if shapes else [],
         vertex_normals=interpolated,
         flip_normals=flipped,
         dropped=not_finite,
         warnings=warnings,
     )
+
+
+def rectangle_corners(geometry: Geometry, shapes: list[Any], number: int) -> Any:
+    """(4, 3) vertices of a mesh if it is a rectangle, else None."""
+    if number >= len(shapes) or objects.plugin_name(shapes[number]) != "rectangle":
+        return None
+    first = geometry.first_faces[number]
+    indices = np.unique(geometry.faces[first : first + geometry.face_counts[number]])
+    return geometry.vertices[indices]
 
 
 def has_area(vertices: npt.NDArray[np.float32], faces: npt.NDArray[np.uint32]) -> bool:

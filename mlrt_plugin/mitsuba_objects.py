@@ -20,8 +20,18 @@ PLUGIN_OF_CLASS = {
     "Rectangle": "rectangle",
     "Cube": "cube",
     "Mesh": "mesh",
+    "Sphere": "sphere",
+    "Disk": "disk",
+    "Cylinder": "cylinder",
+    "Instance": "instance",
+    "ShapeGroupPlugin": "shapegroup",
     "SmoothDiffuse": "diffuse",
     "TwoSidedBRDF": "twosided",
+    "MaskBSDF": "mask",
+    "SmoothConductor": "conductor",
+    "SmoothDielectric": "dielectric",
+    "ThinDielectric": "thindielectric",
+    "Null": "null",
     "PointLight": "point",
     "SpotLight": "spot",
     "DirectionalEmitter": "directional",
@@ -50,6 +60,12 @@ PLUGIN_OF_CLASS = {
     "MlrtIntegrator": "mlrt",
     "UniformSpectrum": "uniform",
     "SRGBReflectanceSpectrum": "srgb",
+    "Checkerboard": "checkerboard",
+    "MeshAttribute": "mesh_attribute",
+    **{
+        f"BitmapTextureImpl[{storage}]": "bitmap"
+        for storage in ("uint8", "float16", "float32", "float64")
+    },
 }
 """Plugin names of the classes of Mitsuba that scenes commonly use; others go by their
 class."""

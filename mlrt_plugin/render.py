@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from ._dispatch import core
 from .emitters import check_areas, check_distances
-from .errors import MlrtError, SceneError, warn_of
+from .errors import MlrtError, warn_of
 from .integrators import own_aovs
+from .object_set import RayQueries, add_timings, common_bounds, obtain_objects
 from .options import (
     AOVS,
     BUILD_OPTIONS,
@@ -23,10 +24,11 @@ from .options import (
     integer,
     split_options,
 )
-from .samplers import possible_spp
-from .scene_arrays import Lighting, SceneArrays, same_geometry
+from .samplers import checked_spp, own_spp, possible_spp, rounded
+from .scene_arrays import Lighting, SceneArrays, Shape, same_geometry
 from .scene_import import SceneSource, import_scene
 from .shading_choice import ShadingChoice, choose_shading
+from .texture_arrays import fields_of
 from .threads import thread_count
 from .tree_cache import ObtainedTree, obtain_tree
 from .tree_report import invisible_meshes, tree_report
@@ -46,8 +48,9 @@ class RenderResult:
     image: (H, W, 3) float32, linear RGB.
     aovs: by name: depth (H, W) float32, distance from the near plane in scene units, 0 for
     a miss; normal (H, W, 3) float32, shading normal in world space; both are filtered as
-    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss
-    and for shapes that are not in the tree.
+    colours are; prim (H, W) int32, the face that a pixel's first sample hit, -1 for a miss.
+    Natively, faces of shapegroups and then analytic shapes are numbered on from those of
+    the tree; where Mitsuba shades they are -1.
     timings: seconds of load, build and render; with a cache of trees those that
     `ObtainedTree` names in place of build.
     counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays;
@@ -66,7 +69,7 @@ NATIVE = ShadingChoice("native", "arrays of a scene are given")
 
 
 @dataclasses.dataclass(frozen=True)
-class PreparedScene:
+class PreparedScene(RayQueries):
     """A scene with its tree, ready to be rendered any number of times."""
 
     arrays: SceneArrays
@@ -76,6 +79,7 @@ class PreparedScene:
     timings: dict[str, float]
     tree_warnings: tuple[str, ...] = ()
     shading: ShadingChoice = NATIVE
+    objects: Any = None
 
     @property
     def lighting(self) -> Lighting:
@@ -100,6 +104,17 @@ class PreparedScene:
         """The tree if it is that of other arrays too, bit for bit, else None."""
         same = build_options == self.build_options and same_geometry(self.arrays, arrays)
         return self.tree if same else None
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """All shapes, by the numbers that `closest_hit` gives."""
+        return self.arrays.all_shapes()
+
+    @property
+    def shape_names(self) -> tuple[str, ...]:
+        """What messages call them."""
+        others = self.arrays.objects
+        return self.arrays.shape_names + (others.shape_names if others is not None else ())
 
     def warn(self, stacklevel: int = 1) -> None:
         """Warns of what is approximated or ignored, as if the caller did."""
@@ -228,20 +243,26 @@ def prepare(
         obtained = obtain_tree(arrays.vertices, arrays.faces, build, tree_cache)
     else:
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
-    check_distances(arrays.emitters, obtained.tree.bounds)
+    others = obtain_objects(arrays.objects, len(arrays.faces), build, tree_cache)
+    add_timings(obtained.timings, others.timings)
+    check_distances(arrays.emitters, common_bounds(obtained.tree, others.handle))
     check_areas(arrays)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,
-        arrays.faces if len(arrays.normals) else arrays.faces[:0],
+        arrays.faces if len(arrays.normals) or arrays.textures else arrays.faces[:0],
         arrays.normals,
-        [dataclasses.asdict(shape) for shape in arrays.shapes],
+        [dataclasses.asdict(shape) for shape in arrays.all_shapes()],
         arrays.materials,
         [dataclasses.asdict(emitter) for emitter in arrays.emitters],
         dataclasses.asdict(arrays.camera),
         dataclasses.asdict(arrays.film),
         bool(hide),
         arrays.environment if arrays.environment.size else None,
+        arrays.uvs,
+        [fields_of(texture) for texture in arrays.textures],
+        arrays.material_textures,
+        others.handle,
     )
     return PreparedScene(
         arrays,
@@ -249,8 +270,9 @@ def prepare(
         obtained.tree,
         build,
         {"load": loaded - start, **obtained.timings},
-        obtained.warnings + invisible_meshes(obtained.tree, arrays),
+        obtained.warnings + others.warnings + invisible_meshes(obtained.tree, arrays),
         choice,
+        others.handle,
     )
 
 
@@ -323,35 +345,6 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
-
-
-def rounded(sampler: str, asked: int, taken: int) -> tuple[str, ...]:
-    """What there is to say of samples per pixel that are not as many as were asked for."""
-    if taken == asked:
-        return ()
-    return (f"sampler '{sampler}' takes {taken} samples a pixel in place of {asked}",)
-
-
-def checked_spp(spp: int) -> int:
-    """The number of samples; raises MlrtError unless there is at least one, and TypeError
-    for anything but a whole number."""
-    spp = integer(spp, "spp")
-    if spp < 1:
-        raise MlrtError(f"spp = {spp} is too few: at least 1 sample per pixel is needed")
-    if spp > 0xFFFFFFFF:
-        raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
-    return spp
-
-
-def own_spp(spp: int, sampler: str) -> int:
-    """The number of samples that a scene's sampler, of that name, says; raises SceneError
-    for none."""
-    if spp < 1:
-        raise SceneError(
-            f"{sampler or 'the sampler'} has sample_count = {spp}, so its image would have "
-            "no samples: set it to 1 or more, or choose another number with --spp (spp=)"
-        )
-    return checked_spp(spp)
 
 
 def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -14,7 +14,8 @@ from .image_files import check_output, write_image
 from .integrators import own_aovs
 from .options import AOVS, SHADOW_OFFSETS
 from .progress import ProgressBar
-from .render import checked_seed, checked_spp, prepare
+from .render import checked_seed, prepare
+from .samplers import checked_spp
 from .shading_choice import SHADINGS
 from .threads import thread_count
 from .tree_command import add_build_options, add_tree_cache, build_options_of

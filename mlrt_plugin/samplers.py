@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from . import mitsuba_objects as objects
-from .errors import MlrtError, UnsupportedFeature
+from .errors import MlrtError, SceneError, UnsupportedFeature
 from .features import SAMPLERS
+from .options import integer
 from .scene_arrays import Sampler
 
 LARGEST_NUMBER = 2**32 - 1
@@ -67,3 +68,32 @@ def possible_spp(sampler: Sampler, spp: int, pixels: int) -> int:
 def ceiled_root(number: int) -> int:
     """The least whole number whose square is not less."""
     return math.isqrt(number - 1) + 1 if number > 0 else 0
+
+
+def rounded(sampler: str, asked: int, taken: int) -> tuple[str, ...]:
+    """What there is to say of samples per pixel that are not as many as were asked for."""
+    if taken == asked:
+        return ()
+    return (f"sampler '{sampler}' takes {taken} samples a pixel in place of {asked}",)
+
+
+def checked_spp(spp: int) -> int:
+    """The number of samples; raises MlrtError unless there is at least one, and TypeError
+    for anything but a whole number."""
+    spp = integer(spp, "spp")
+    if spp < 1:
+        raise MlrtError(f"spp = {spp} is too few: at least 1 sample per pixel is needed")
+    if spp > 0xFFFFFFFF:
+        raise MlrtError(f"spp = {spp} is too many: it must be below 2**32")
+    return spp
+
+
+def own_spp(spp: int, sampler: str) -> int:
+    """The number of samples that a scene's sampler, of that name, says; raises SceneError
+    for none."""
+    if spp < 1:
+        raise SceneError(
+            f"{sampler or 'the sampler'} has sample_count = {spp}, so its image would have "
+            "no samples: set it to 1 or more, or choose another number with --spp (spp=)"
+        )
+    return checked_spp(spp)

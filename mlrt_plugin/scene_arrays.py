@@ -9,10 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+
+from .texture_arrays import Texture
+
+if TYPE_CHECKING:
+    from .object_arrays import ObjectArrays
 
 NONE = 0xFFFFFFFF
 """Marks the absence of a material, emitter or shape."""
@@ -56,6 +61,7 @@ class Shape:
     emitter: int = NONE
     vertex_normals: bool = False
     flip_normals: bool = False
+    texture_coordinates: bool = False
 
 
 @dataclass(frozen=True)
@@ -179,9 +185,12 @@ class SceneArrays:
     faces: (F, 3) uint32, numbers of vertices; the faces of a shape follow one another.
     normals: (V, 3) float32, unit; (0, 3) if no shape interpolates vertex normals.
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
+    material_textures: (M, 3) uint32, numbers of textures in place of these two, and of the
+    opacity, or NONE. uvs: (V, 2) float32; (0, 2) if no texture needs any.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
-    each. shape_names: what messages call the shapes. not_finite_faces: how many faces of
+    each. shape_names: what messages call the shapes. objects: what is not in these arrays:
+    analytic shapes and instances. not_finite_faces: how many faces of
     each shape had a vertex that is not finite; they are points now.
     sampler: of the sensor.
     environment: (H, W, 3) float32, linear RGB radiance in latitude and longitude, the first
@@ -203,10 +212,21 @@ class SceneArrays:
     warnings: tuple[str, ...]
     shape_names: tuple[str, ...] = ()
     not_finite_faces: tuple[int, ...] = ()
+    textures: tuple[Texture, ...] = ()
+    material_textures: npt.NDArray[np.uint32] | None = None
+    uvs: npt.NDArray[np.float32] | None = None
     sampler: Sampler = Sampler()
     environment: npt.NDArray[np.float32] = field(default_factory=no_environment)
+    objects: ObjectArrays | None = None
 
     def __post_init__(self) -> None:
         for array in (self.vertices, self.faces, self.normals, self.materials):
             array.setflags(write=False)
+        for optional in (self.material_textures, self.uvs):
+            if optional is not None:
+                optional.setflags(write=False)
         self.environment.setflags(write=False)
+
+    def all_shapes(self) -> tuple[Shape, ...]:
+        """Those of the tree and of `objects`, in the order of their faces."""
+        return self.shapes + (self.objects.shapes if self.objects is not None else ())

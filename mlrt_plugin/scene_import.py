@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
-import numpy as np
 
 from . import camera as cameras
-from . import elements, emitters, features, integrators, meshes, parsing, samplers
+from . import (
+    elements,
+    emitters,
+    features,
+    integrators,
+    meshes,
+    parsing,
+    samplers,
+    scene_objects,
+)
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
-from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape, no_environment
+from .scene_arrays import NONE, Feature, Lighting, SceneArrays, Shape
+from .texture_coordinates import gather_coordinates
+from .textures import Surface
 
 SceneSource = Any
 """A path of an XML file, a dictionary as ``mi.load_dict`` takes it, or a loaded
@@ -41,11 +51,15 @@ class SceneSummary:
 
 @dataclass(frozen=True)
 class LoadedScene:
-    """The objects of a loaded scene, each kind in the order of declaration."""
+    """The objects of a loaded scene, each kind in the order of declaration.
+
+    groups: the shapes of each shapegroup, by its id.
+    """
 
     shapes: list[Any]
     emitters: list[Any]
     sensors: list[Any]
+    groups: dict[str, list[Any]] = field(default_factory=dict)
 
     @staticmethod
     def of_parts(parts: list[Any]) -> LoadedScene:
@@ -134,7 +148,9 @@ def import_scene(
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
         parts, names = parsing.instantiate(parsed)
-        loaded = LoadedScene.of_parts(parts)
+        loaded = replace(
+            LoadedScene.of_parts(parts), groups=scene_objects.group_children(parsed, names)
+        )
     return collect(loaded, names, sensor, resolution, found, lighting, warnings)
 
 
@@ -297,21 +313,31 @@ def collect(
             )
         return str(element)
 
-    shapes, sources, sensor = scene.shapes, scene.emitters, scene.sensors[sensor_number]
+    by_way = scene_objects.sorted_shapes(scene.shapes, scene.groups, names)
+    shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
-    emitter_of_shape = [NONE] * len(shapes)
-    shape_of_emitter = [NONE] * len(sources)
-    for number, shape in enumerate(shapes):
-        own = shape.emitter()
-        for index, source in enumerate(sources):
-            if own is not None and own is source:
-                emitter_of_shape[number], shape_of_emitter[index] = index, number
-    environment = no_environment()
-    for source in sources:
-        if objects.plugin_name(source) == "envmap":
-            environment = emitters.read_environment(source, name_of(source))
+    surfaces = zip(
+        shapes, shape_names, geometry.first_faces, geometry.first_vertices, strict=True
+    )
+    rows = [materials.add(Surface(*surface), names) for surface in surfaces]
+    textured = materials.uses_coordinates()
+    coordinates = gather_coordinates(
+        shapes, shape_names, [textured[row] for row in rows], geometry.first_vertices
+    )
+    others = scene_objects.gather_objects(
+        by_way,
+        names,
+        len(geometry.faces),
+        name_of,
+        # Their textures and masks are refused, so that no numbers in the tree count.
+        lambda shape: materials.add(Surface(shape, name_of(shape), 0, 0), names),
+        geometry.warnings,
+    )
+    shape_of_emitter, emitter_of_shape = scene_objects.lights_of_shapes(
+        by_way, others, sources
+    )
     film, ignored = cameras.read_film(sensor.film(), name_of(sensor.film()))
     if resolution is not None:
         film = cameras.resized(film, resolution)
@@ -330,17 +356,21 @@ def collect(
             Shape(
                 first_face=geometry.first_faces[number],
                 face_count=geometry.face_counts[number],
-                material=materials.add(shape.bsdf(), shape_names[number]),
-                emitter=emitter_of_shape[number],
+                material=rows[number],
+                emitter=emitter_of_shape.get(number, NONE),
                 vertex_normals=geometry.vertex_normals[number],
                 flip_normals=geometry.flip_normals[number],
+                texture_coordinates=coordinates.present[number],
             )
-            for number, shape in enumerate(shapes)
+            for number in range(len(shapes))
         ),
         materials=materials.array(),
         emitters=tuple(
             emitters.read_emitter(
-                source, name_of(source), shape, rectangle_corners(geometry, shapes, shape)
+                source,
+                name_of(source),
+                shape,
+                meshes.rectangle_corners(geometry, shapes, shape),
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),
@@ -350,18 +380,15 @@ def collect(
         spp=int(source.sample_count()),
         base_seed=base_seed,
         features=found,
-        warnings=tuple(dict.fromkeys([*warnings, *geometry.warnings, *ignored])),
+        warnings=tuple(
+            dict.fromkeys([*warnings, *geometry.warnings, *coordinates.warnings, *ignored])
+        ),
         shape_names=tuple(shape_names),
         not_finite_faces=tuple(geometry.dropped),
+        textures=tuple(materials.textures.textures),
+        material_textures=materials.texture_array(),
+        uvs=coordinates.uvs,
         sampler=sampler,
-        environment=environment,
+        environment=emitters.environment_of(sources, name_of),
+        objects=scene_objects.with_lights(others, len(shapes), emitter_of_shape),
     )
-
-
-def rectangle_corners(geometry: meshes.Geometry, shapes: list[Any], number: int) -> Any:
-    """(4, 3) vertices of a shape if it is a rectangle, else None."""
-    if number == NONE or objects.plugin_name(shapes[number]) != "rectangle":
-        return None
-    first = geometry.first_faces[number]
-    indices = np.unique(geometry.faces[first : first + geometry.face_counts[number]])
-    return geometry.vertices[indices]

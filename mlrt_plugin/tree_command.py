@@ -100,6 +100,9 @@ class TreeScene:
     arrays: SceneArrays | None = None
 
 
+NO_MESH = "has no triangle meshes outside of groups, and so no tree"
+
+
 def scene_of_tree(arguments: argparse.Namespace) -> TreeScene:
     """Reads the scene that is named; raises SceneError if it has no triangles."""
     what: dict[str, Any] = {
@@ -109,6 +112,8 @@ def scene_of_tree(arguments: argparse.Namespace) -> TreeScene:
     choice = choose_shading(arguments.scene, **what)
     if choice.path == "native":
         arrays = import_scene(arguments.scene, **what, force_direct=True)
+        if not len(arrays.faces):
+            raise SceneError(f"{arguments.scene} {NO_MESH}")
         return TreeScene(
             arrays.vertices, arrays.faces, arrays.lighting, arrays.warnings, arrays
         )
@@ -119,7 +124,7 @@ def scene_of_tree(arguments: argparse.Namespace) -> TreeScene:
     loaded = load_scene(arguments.scene, reason=choice.reason, **what, force_direct=True)
     faces = mesh_faces(loaded.shapes, loaded.names)
     if faces is None:
-        raise SceneError(f"{arguments.scene} has no triangle meshes, and so no tree")
+        raise SceneError(f"{arguments.scene} {NO_MESH}")
     geometry = faces.geometry
     warnings = (*loaded.warnings, *geometry.warnings)
     return TreeScene(geometry.vertices, geometry.faces, loaded.lighting, warnings)

@@ -64,6 +64,7 @@ class MitsubaWorker:
 def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any:
     """The picture of ``direct`` with one emitter sample; with ``aovs``, that of ``aov``."""
     import mitsuba as mi
+    import object_scenes
     import render_scenes
 
     integrator: dict[str, Any] = {
@@ -75,7 +76,21 @@ def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any
     if "aovs" in options:
         integrator = {"type": "aov", "aovs": options["aovs"]}
     # Merging meshes would make the order of emitters differ from run to run.
-    loaded = mi.load_dict(render_scenes.SCENES[scene](folder), optimize=False)
+    description = (
+        object_scenes.SCENES[scene]()
+        if scene in object_scenes.SCENES
+        else render_scenes.SCENES[scene](folder)
+    )
+    loaded = mi.load_dict(description, optimize=False)
+    return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
+
+
+def render_file(folder: Path, path: str, spp: int, seed: int, bsdf_samples: int = 0) -> Any:
+    """The picture of ``direct`` with one emitter sample, of a scene file."""
+    import mitsuba as mi
+
+    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": bsdf_samples}
+    loaded = mi.load_file(path, optimize=False)
     return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
 
 
@@ -157,12 +172,15 @@ def main(folder: Path) -> None:
         import mitsuba as mi
 
         mi.set_variant("llvm_ad_rgb")
+        # Its log goes to standard output, where the answers are.
+        mi.set_log_level(mi.LogLevel.Error)
     except (llvm.LlvmUnavailable, ImportError) as error:
         print(" ".join(str(error).split()), file=answers, flush=True)
         return
     print(READY, file=answers, flush=True)
     functions = {
         "render": render,
+        "render_file": render_file,
         "sampler": sampler,
         "sampler_pairs": sampler_pairs,
         "image_block": image_block,

@@ -10,6 +10,7 @@ void bind_image_plane(nanobind::module_ &m);
 void bind_kdtree_selftest(nanobind::module_ &m);
 void bind_mlrta_selftest(nanobind::module_ &m);
 void bind_numerics(nanobind::module_ &m);
+void bind_objects(nanobind::module_ &m);
 void bind_render(nanobind::module_ &m);
 void bind_render_selftest(nanobind::module_ &m);
 void bind_scene(nanobind::module_ &m);

@@ -223,8 +223,8 @@ nb::dict robust_segment_of(const SceneHandle &handle, const Floats3 &origin,
     const OneEmitterSample light = sample_emitter(scene, p, x, y);
     if (light.emitter == NONE)
         refuse_value("The scene must have an emitter.");
-    const auto [start, target] =
-        robust_segment<float>(scene, {o, d, primitive}, light.emitter, light);
+    const auto [start, target] = robust_segment<float>(
+        scene, hit_plane<float>(scene, {o, d, primitive}), light.emitter, light);
     nb::dict result;
     result["start"] = array(start);
     result["target"] = array(target);

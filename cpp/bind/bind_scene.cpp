@@ -1,13 +1,18 @@
 // The class Scene: arrays and dicts of an imported scene, checked once.
 #include "bind/bind.h"
 #include "bind/fields.h"
+#include "bind/objects_handle.h"
+#include "bind/scene_checks.h"
 #include "bind/scene_handle.h"
+#include "bind/textures.h"
 #include "bind/tree_handle.h"
 #include "render/filter.h"
 
 #include <cmath>
 #include <cstring>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+#include <optional>
 #include <string>
 
 namespace nb = nanobind;
@@ -25,14 +30,39 @@ std::string numbered(const char *list, size_t i) {
 
 template <typename Element, typename T>
 std::vector<Element> rows(const Array<T> &array, const char *name) {
-    static_assert(sizeof(Element) == 3 * sizeof(T));
-    if (array.ndim() != 2 || array.shape(1) != 3)
-        refuse_value(std::string(name) + " must have shape (N, 3).");
+    constexpr size_t width = sizeof(Element) / sizeof(T);
+    static_assert(sizeof(Element) == width * sizeof(T));
+    if (array.ndim() != 2 || array.shape(1) != width)
+        refuse_value(std::string(name) + " must have shape (N, " + std::to_string(width) +
+                     ").");
     std::vector<Element> result(array.shape(0));
     if (!result.empty())
         std::memcpy(static_cast<void *>(result.data()), array.data(),
                     result.size() * sizeof(Element));
     return result;
+}
+
+uint32_t texture_number(uint32_t number, size_t material, size_t count) {
+    if (number != NONE && number >= count)
+        refuse_value(numbered("material_textures", material) + " refers to texture " +
+                     std::to_string(number) + ", but there are " + std::to_string(count) +
+                     ".");
+    return number;
+}
+
+void add_textures(std::vector<Material> &materials,
+                  const std::optional<Array<uint32_t>> &numbers, size_t texture_count) {
+    if (!numbers)
+        return;
+    if (numbers->ndim() != 2 || numbers->shape(0) != materials.size() ||
+        numbers->shape(1) != 3)
+        refuse_value("material_textures must have shape (M, 3), as many as materials.");
+    for (size_t i = 0; i < materials.size(); ++i) {
+        const uint32_t *in = numbers->data() + 3 * i;
+        materials[i].front_texture = texture_number(in[0], i, texture_count);
+        materials[i].back_texture = texture_number(in[1], i, texture_count);
+        materials[i].opacity = texture_number(in[2], i, texture_count);
+    }
 }
 
 std::vector<Material> materials_from(const Array<float> &array) {
@@ -41,7 +71,9 @@ std::vector<Material> materials_from(const Array<float> &array) {
     std::vector<Material> materials;
     for (size_t i = 0; i < array.shape(0); ++i) {
         const float *in = array.data() + 6 * i;
-        materials.push_back({{in[0], in[1], in[2]}, {in[3], in[4], in[5]}});
+        Material &material = materials.emplace_back();
+        material.front = {in[0], in[1], in[2]};
+        material.back = {in[3], in[4], in[5]};
         for (int k = 0; k < 6; ++k)
             if (!(std::isfinite(in[k]) && in[k] >= 0))
                 refuse_value(numbered("materials", i) +
@@ -60,8 +92,10 @@ Shape shape_from(nb::handle dict, const std::string &name, const SceneData &scen
     shape.emitter = fields.index("emitter", emitter_count, NONE);
     shape.vertex_normals = fields.boolean("vertex_normals", false);
     shape.flip_normals = fields.boolean("flip_normals", false);
+    shape.texture_coordinates = fields.boolean("texture_coordinates", false);
     fields.finish();
-    if (shape.vertex_normals && (scene.faces.empty() || scene.normals.empty()))
+    if (shape.vertex_normals && !is_object(scene, shape) &&
+        (scene.faces.empty() || scene.normals.empty()))
         refuse_value(name + " has vertex normals, but faces or normals are empty.");
     return shape;
 }
@@ -140,82 +174,28 @@ EnvironmentPicture environment_from(const Array<float> &array) {
     return picture;
 }
 
-// Light from all around comes from one emitter at most, and a picture belongs to it.
-void check_environment(const SceneData &scene) {
-    size_t environments = 0, pictures = 0;
-    for (const Emitter &emitter : scene.emitters) {
-        environments += is_environment(emitter.type);
-        pictures += emitter.type == EmitterType::envmap;
-    }
-    if (environments > 1)
-        refuse_value("emitters must have at most one of the types constant and envmap.");
-    if ((pictures > 0) != (scene.environment.width > 0))
-        refuse_value("environment must be given if and only if an emitter is an envmap.");
-}
-
-// Shapes cover the faces in order, and refer to their emitters as these refer to them.
-void check_shapes(const SceneData &scene) {
-    uint64_t next_face = 0;
-    for (size_t i = 0; i < scene.shapes.size(); ++i) {
-        const Shape &shape = scene.shapes[i];
-        const std::string name = numbered("shapes", i);
-        if (shape.first_face != next_face)
-            refuse_value(name + " must begin at face " + std::to_string(next_face) +
-                         ", where the one before it ends.");
-        next_face += shape.face_count;
-        if (next_face > scene.tree->triangles.size())
-            break;
-        if (shape.emitter != NONE &&
-            (scene.emitters[shape.emitter].type != EmitterType::area ||
-             scene.emitters[shape.emitter].shape != i))
-            refuse_value(name +
-                         " glows, but its emitter is not an area light of this shape.");
-    }
-    if (next_face != scene.tree->triangles.size())
-        refuse_value("shapes cover " + std::to_string(next_face) +
-                     " faces, but the tree has " +
-                     std::to_string(scene.tree->triangles.size()) + ".");
-    for (size_t i = 0; i < scene.emitters.size(); ++i) {
-        const Emitter &emitter = scene.emitters[i];
-        if (emitter.type != EmitterType::area)
-            continue;
-        if (scene.shapes[emitter.shape].emitter != i)
-            refuse_value(numbered("emitters", i) + " is not the emitter of its shape.");
-        if (scene.shapes[emitter.shape].face_count == 0)
-            refuse_value(numbered("emitters", i) + " glows on a shape without faces.");
-    }
-}
-
-void check_vertices(const SceneData &scene) {
-    if (!scene.faces.empty() && scene.faces.size() != scene.tree->triangles.size())
-        refuse_value("faces has " + std::to_string(scene.faces.size()) +
-                     " rows, but the tree has " +
-                     std::to_string(scene.tree->triangles.size()) + " triangles.");
-    for (const Shape &shape : scene.shapes) {
-        if (!shape.vertex_normals)
-            continue;
-        for (uint32_t i = shape.first_face; i < shape.first_face + shape.face_count; ++i)
-            for (const uint32_t vertex : scene.faces[i])
-                if (vertex >= scene.normals.size())
-                    refuse_value(numbered("faces", i) + " refers to normal " +
-                                 std::to_string(vertex) + ", but there are " +
-                                 std::to_string(scene.normals.size()) + ".");
-    }
-    for (size_t i = 0; i < scene.normals.size(); ++i)
-        if (!is_finite(scene.normals[i]))
-            refuse_value(numbered("normals", i) + " must be finite.");
-}
-
 SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &normals, const nb::list &shapes,
                        const Array<float> &materials, const nb::list &emitters,
                        const nb::dict &camera, const nb::dict &film, bool hide_emitters,
-                       const Array<float> &environment) {
+                       const Array<float> &environment,
+                       const std::optional<Array<float>> &uvs, const nb::list &textures,
+                       const std::optional<Array<uint32_t>> &material_textures,
+                       const nb::object &objects) {
     SceneData scene;
     scene.tree = tree.tree;
+    if (!objects.is_none()) {
+        scene.objects = nb::cast<const ObjectsHandle &>(objects).objects;
+        if (scene.objects->first_face != scene.tree->triangles.size())
+            refuse_value("objects must begin at the face after the last of the tree.");
+    }
     scene.faces = rows<std::array<uint32_t, 3>>(faces, "faces");
     scene.normals = rows<Vec3f>(normals, "normals");
+    if (uvs)
+        scene.uvs = rows<Vec2f>(*uvs, "uvs");
+    scene.textures = textures_from(textures);
     scene.materials = materials_from(materials);
+    add_textures(scene.materials, material_textures, scene.textures.size());
     for (size_t i = 0; i < shapes.size(); ++i)
         scene.shapes.push_back(
             shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
@@ -234,6 +214,7 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
     check_environment(scene);
     check_shapes(scene);
     check_vertices(scene);
+    check_textures(scene);
     return {std::make_shared<const PreparedScene>(std::move(scene))};
 }
 
@@ -332,12 +313,21 @@ void bind_scene(nb::module_ &m) {
             nb::new_(&make_scene), nb::arg("tree"), nb::arg("faces"), nb::arg("normals"),
             nb::arg("shapes"), nb::arg("materials"), nb::arg("emitters"), nb::arg("camera"),
             nb::arg("film"), nb::arg("hide_emitters") = false,
-            nb::arg("environment").none() = nb::none(),
+            nb::arg("environment").none() = nb::none(), nb::arg("uvs") = nb::none(),
+            nb::arg("textures") = nb::list(), nb::arg("material_textures") = nb::none(),
+            nb::arg("objects") = nb::none(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
-            "vertex normals. normals: float32 (V, 3) or (0, 3). shapes, emitters: lists of "
+            "vertex normals or textures. normals: float32 (V, 3) or (0, 3). shapes, "
+            "emitters: lists of "
             "dicts, camera, film: dicts; keys are the fields of the structs in "
             "render/scene.h. materials: float32 (M, 2, 3), reflectance of front and back. "
             "environment: float32 (H, W, 3), the picture of the emitter that is an envmap. "
+            "uvs: float32 (V, 2), texture coordinates of the vertices. textures: list of "
+            "dicts, fields of the struct in render/texture.h, with the rows of to_uv as "
+            "to_u and to_v, and squares as square_0 and square_1. material_textures: "
+            "uint32 (M, 3), the texture of front, of back, and of the opacity; 2^32 - 1: "
+            "none. objects: Objects beside the tree, or None; shapes cover their faces "
+            "too. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

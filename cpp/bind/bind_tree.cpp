@@ -5,6 +5,7 @@
 #include "bind/bind.h"
 #include "bind/build_options.h"
 #include "bind/mesh_arrays.h"
+#include "bind/ray_arrays.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
@@ -25,8 +26,6 @@ namespace mlrt {
 
 namespace {
 
-using Values = nb::ndarray<const float, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
-
 TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &options) {
     const BuildOptions build_options = build_options_from(options);
     HugeArray<Triangle> triangles = triangles_of(vertices, faces);
@@ -39,93 +38,6 @@ TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &o
     watch.rethrow();
     return {std::make_shared<const KdTree>(std::move(built->tree)), built->report,
             build_options};
-}
-
-// Rays of a query, one array a component.
-class RayArrays {
-public:
-    RayArrays(const Points &origins, const Points &directions, const Values &t_min,
-              const Values &t_max)
-        : t_min_(t_min.data()), t_max_(t_max.data()), count_(origins.shape(0)) {
-        if (directions.shape(0) != count_ || t_min.shape(0) != count_ ||
-            t_max.shape(0) != count_)
-            throw nb::value_error(
-                "origins, directions, t_min and t_max must have the same length");
-        if (count_ > 0xffffff00u)
-            throw nb::value_error("at most 2^32 - 256 rays at a time");
-        nb::gil_scoped_release release;
-        for (int k = 0; k < 3; ++k) {
-            origins_[k].resize(count_);
-            directions_[k].resize(count_);
-            for (size_t i = 0; i < count_; ++i) {
-                origins_[k][i] = origins(i, size_t(k));
-                directions_[k][i] = directions(i, size_t(k));
-            }
-        }
-    }
-
-    size_t count() const { return count_; }
-
-    Vec3f origin(size_t i) const {
-        return {origins_[0][i], origins_[1][i], origins_[2][i]};
-    }
-    Vec3f direction(size_t i) const {
-        return {directions_[0][i], directions_[1][i], directions_[2][i]};
-    }
-
-    RayGroup group(size_t first, size_t count) const {
-        RayGroup group;
-        group.count = uint32_t(count);
-        for (int k = 0; k < 3; ++k) {
-            group.origin[k] = origins_[k].data() + first;
-            group.direction[k] = directions_[k].data() + first;
-        }
-        group.t_min = t_min_ + first;
-        group.t_max = t_max_ + first;
-        // A common origin costs less, and cameras and point lights have one.
-        group.common_origin = origin(first);
-        group.has_common_origin = true;
-        for (size_t i = first; i < first + count && group.has_common_origin; ++i)
-            group.has_common_origin = origin(i) == group.common_origin;
-        return group;
-    }
-
-    // Calls trace(first, group, counters) on runs of rays, in parallel. Returns what was
-    // counted.
-    template <typename Trace>
-    Counters for_each_group(uint32_t group_size, Trace &&trace) const {
-        Watch watch;
-        Counters total;
-        std::mutex mutex;
-        const auto trace_one = [&](uint32_t index) {
-            const size_t first = size_t(index) * group_size;
-            Counters counters;
-            trace(first, group(first, std::min<size_t>(group_size, count_ - first)),
-                  counters);
-            const std::lock_guard lock(mutex);
-            total += counters;
-        };
-        {
-            nb::gil_scoped_release release;
-            parallel_for(uint32_t((count_ + group_size - 1) / group_size), trace_one,
-                         [&] { return watch(); });
-        }
-        watch.rethrow();
-        return total;
-    }
-
-private:
-    std::vector<float> origins_[3], directions_[3];
-    const float *t_min_, *t_max_;
-    size_t count_;
-};
-
-// Whether all rays are likely to have one origin: each group finds out for itself.
-uint32_t group_size(const RayArrays &rays, const TraceOptions &options) {
-    const size_t count = rays.count();
-    return unordered_group_size(options, count,
-                                count > 0 && rays.origin(0) == rays.origin(count / 2) &&
-                                    rays.origin(0) == rays.origin(count - 1));
 }
 
 nb::tuple closest_hit(const TreeHandle &self, const Points &origins,

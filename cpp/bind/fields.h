@@ -127,6 +127,9 @@ public:
         return has(key) ? choice(key, names) : otherwise;
     }
 
+    // Whatever is there, for the caller to look into.
+    nanobind::object object(const char *key) { return value(key); }
+
     // Refuses keys that were not asked for.
     void finish() const {
         for (const auto &[key, unused] : dict_) {

@@ -9,6 +9,7 @@ NB_MODULE(MLRT_MODULE, m) {
     mlrt::bind_numerics(m);
     mlrt::bind_tree(m);
     mlrt::bind_tree_files(m);
+    mlrt::bind_objects(m);
     mlrt::bind_scene(m);
     mlrt::bind_image_plane(m);
     mlrt::bind_render(m);

@@ -1,5 +1,7 @@
 #include "render/emitter_sampling.h"
 
+#include "render/analytic_emitter.h"
+
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
@@ -49,11 +51,6 @@ FloatPacket choose_face(const EmitterTable &table, uint32_t first_face,
     return load<FloatPacket>(lanes);
 }
 
-template <typename Real>
-Vec3<Real> spread(Vec3f v) {
-    return {Real(v.x), Real(v.y), Real(v.z)};
-}
-
 // The same face in all lanes.
 template <typename Real>
 FacesOf<Real> all_of(uint32_t face) {
@@ -98,6 +95,41 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
     if (shape.flip_normals)
         point.normal = -point.normal;
     return point;
+}
+
+// A point of an analytic shape that glows, with its density by solid angle.
+template <typename Real>
+struct AnalyticLight {
+    Vec3<Real> p, direction;
+    Real density;
+    MaskOf<Real> is_lit;
+};
+
+template <typename Real>
+AnalyticLight<Real> sample_analytic(const PreparedScene &scene,
+                                    const AnalyticShape &analytic, uint32_t emitter,
+                                    const Vec3<Real> &p, const Real &x, const Real &y) {
+    const EmitterTable &table = scene.emitter_tables[emitter];
+    const bool flipped = scene.data.shapes[scene.data.emitters[emitter].shape].flip_normals;
+    const bool by_solid_angle = analytic.type == AnalyticType::sphere;
+    AnalyticSample<Real> sample =
+        by_solid_angle ? sample_sphere(analytic, flipped, table.inverse_area, p, x, y)
+        : analytic.type == AnalyticType::disk ? sample_disk(analytic, table.normal, x, y)
+                                              : sample_cylinder(analytic, x, y);
+    // That of a disk is turned already.
+    if (flipped && analytic.type != AnalyticType::disk)
+        sample.normal = -sample.normal;
+    const Vec3<Real> to_light = sample.p - p;
+    const Real squared = dot(to_light, to_light);
+    AnalyticLight<Real> light;
+    light.p = sample.p;
+    light.direction = to_light * (Real(1.0f) / square_root(squared));
+    const Real cosine = dot(light.direction, sample.normal);
+    light.density =
+        by_solid_angle ? sample.density : Real(table.inverse_area) * (squared / -cosine);
+    light.is_lit = (cosine < Real(0.0f)) & (light.density > Real(0.0f)) &
+                   (light.density < Real(INFINITY));
+    return light;
 }
 
 // Mitsuba's spot.cpp, falloff_curve: linear in the angle between beam width and cut-off.
@@ -185,6 +217,17 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         if (!(table.inverse_area > 0))
             return {spread<Real>({}), spread<Real>({}), spread<Real>({}),
                     all_of<Real>(NONE)};
+        if (const AnalyticShape *analytic =
+                scene.analytic(scene.data.shapes[emitter.shape])) {
+            const AnalyticLight<Real> light =
+                sample_analytic(scene, *analytic, number, p, x, y);
+            sample.target = light.p;
+            sample.target_face = all_of<Real>(scene.data.shapes[emitter.shape].first_face);
+            sample.direction = light.direction;
+            has_light = light.is_lit;
+            factor = choice_weight / light.density;
+            break;
+        }
         const AreaPoint<Real> point = sample_area(scene, emitter, table, x, y);
         const Vec3<Real> to_light = point.p - p;
         const Real squared = dot(to_light, to_light);

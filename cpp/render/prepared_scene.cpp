@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace mlrt {
 
@@ -53,7 +54,38 @@ bool is_near(const Box3f &bounds, Vec3f light) {
            FAR * std::max(max_component(abs(bounds.lo)), max_component(abs(bounds.hi)));
 }
 
-EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
+// As Mitsuba has it: of a sphere or cylinder, that of the radius along the x axis of its
+// frame; of a disk, that of the ellipse.
+double analytic_area(const AnalyticShape &shape) {
+    using std::numbers::pi;
+    const auto &[x, y, z] = shape.frame.axes;
+    switch (shape.type) {
+    case AnalyticType::sphere:
+        return 4 * pi * dot(x, x);
+    case AnalyticType::disk:
+        return pi * length(cross(x, y));
+    case AnalyticType::cylinder:
+        return 2 * pi * length(x) * length(z);
+    }
+    return 0;
+}
+
+Vec3f disk_normal(const AnalyticShape &disk) {
+    const Vec3d normal = normalize(cross(disk.frame.axes[0], disk.frame.axes[1]));
+    return Vec3f(disk.frame.determinant() < 0 ? -normal : normal);
+}
+
+Box3f bounds_of(const SceneData &scene) {
+    Box3f bounds = scene.tree->bounds;
+    if (scene.objects && !scene.objects->hierarchy.empty()) {
+        bounds.add(scene.objects->hierarchy.bounds().lo);
+        bounds.add(scene.objects->hierarchy.bounds().hi);
+    }
+    return bounds;
+}
+
+EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitter) {
+    const SceneData &scene = prepared.data;
     EmitterTable table;
     if (emitter.type == EmitterType::spot) {
         table.cos_cutoff = float(std::cos(double(emitter.cutoff_angle)));
@@ -61,13 +93,20 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
         table.inverse_transition = 1.0f / (emitter.cutoff_angle - emitter.beam_width);
     }
     if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
-        table.shadow_rays_from_light =
-            !scene.tree->bounds.empty() && is_near(scene.tree->bounds, emitter.position);
+        // Rays from a light would also be rounded in the frames of instances, at both ends.
+        table.shadow_rays_from_light = !prepared.bounds.empty() &&
+                                       is_near(prepared.bounds, emitter.position) &&
+                                       (!scene.objects || scene.objects->instances.empty());
     if (emitter.type != EmitterType::area)
         return table;
 
     const Shape &shape = scene.shapes[emitter.shape];
-    if (emitter.rectangle) {
+    if (const AnalyticShape *analytic = prepared.analytic(shape)) {
+        table.inverse_area = float(1 / analytic_area(*analytic));
+        if (analytic->type == AnalyticType::disk)
+            table.normal =
+                shape.flip_normals ? -disk_normal(*analytic) : disk_normal(*analytic);
+    } else if (emitter.rectangle) {
         const Vec3f normal = cross(emitter.edge_u, emitter.edge_v);
         table.unevenness = unevenness(scene, shape);
         const float area = parallelogram_area(emitter.edge_u, emitter.edge_v);
@@ -94,25 +133,26 @@ EmitterTable prepare_emitter(const SceneData &scene, const Emitter &emitter) {
 
 PreparedScene::PreparedScene(SceneData scene_data)
     : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
-      environment(data) {
-    shape_of_face.resize(data.tree->triangles.size());
+      environment(data), bounds(bounds_of(data)) {
+    shape_of_face.resize(data.objects ? data.objects->face_end()
+                                      : data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];
         any_shape_glows |= shape.emitter != NONE;
         shape_materials.push_back(shape.material == NONE ? Material{}
                                                          : data.materials[shape.material]);
+        any_material_is_textured |= shape_materials.back().is_textured();
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 
     std::vector<float> weights;
     for (const Emitter &emitter : data.emitters) {
-        emitter_tables.push_back(prepare_emitter(data, emitter));
+        emitter_tables.push_back(prepare_emitter(*this, emitter));
         weights.push_back(emitter.sampling_weight);
     }
     if (std::any_of(weights.begin(), weights.end(), [](float w) { return w != 1.0f; }))
         emitter_choice = Distribution(weights);
 
-    const Box3f &bounds = data.tree->bounds;
     if (!bounds.empty()) {
         center = (bounds.lo + bounds.hi) * 0.5f;
         radius = std::max(RAY_EPSILON, length(bounds.hi - center) * (1 + RAY_EPSILON));

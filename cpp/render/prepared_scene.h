@@ -13,8 +13,8 @@ namespace mlrt {
 
 // What sampling an emitter needs beyond its description.
 struct EmitterTable {
-    Distribution face_areas;      // area, unless a rectangle: of the faces of its shape
-    Vec3f normal{};               // rectangle: unit, on the side that glows
+    Distribution face_areas;      // area, on a mesh but a rectangle: of its faces
+    Vec3f normal{};               // rectangle, disk: unit, on the side that glows
     float inverse_area = 0;       // area: 1 / area
     float edge_scale = 1;         // area: a power of two, 1 unless the area is tiny
     float cos_cutoff = 0;         // spot
@@ -30,13 +30,27 @@ struct PreparedScene {
     std::vector<uint32_t> shape_of_face;
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
+    bool any_material_is_textured = false;
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
-    Vec3f center{}; // of a sphere around all triangles
+    Box3f bounds;   // of all that rays can hit
+    Vec3f center{}; // of a sphere around the bounds
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);
+
+    // Whether a face belongs to the object set, not to the tree.
+    bool is_on_object(uint32_t face) const {
+        return data.objects && face >= data.objects->first_face;
+    }
+    // The analytic shape that a shape is, or none.
+    const AnalyticShape *analytic(const Shape &shape) const {
+        return data.objects && data.objects->is_analytic(shape.first_face)
+                   ? &data.objects
+                          ->analytic[shape.first_face - data.objects->first_analytic_face]
+                   : nullptr;
+    }
 };
 
 } // namespace mlrt

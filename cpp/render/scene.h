@@ -4,6 +4,8 @@
 
 #include "base/vec.h"
 #include "kdtree/tree.h"
+#include "objects/object_set.h"
+#include "render/texture.h"
 
 #include <array>
 #include <cstdint>
@@ -14,7 +16,8 @@ namespace mlrt {
 
 inline constexpr uint32_t NONE = 0xffffffffu;
 
-// A run of faces that share a material and an emitter: one Mitsuba shape.
+// A run of faces that share a material and an emitter: one Mitsuba shape. An analytic shape
+// has one face.
 struct Shape {
     uint32_t first_face = 0;
     uint32_t face_count = 0;
@@ -22,13 +25,21 @@ struct Shape {
     uint32_t emitter = NONE;     // index into SceneData::emitters if the shape glows
     bool vertex_normals = false; // interpolate SceneData::normals, else the face normal
     bool flip_normals = false;
+    bool texture_coordinates = false; // SceneData::uvs, else weights of the vertices
 };
 
-// Lambertian reflectance, a colour per side. A side that reflects nothing is black. Front
-// is the side that the shading normal points to (Mitsuba: cos_theta > 0).
+// Lambertian reflectance, a colour or a texture per side. A side that reflects nothing is
+// black. Front is the side that the shading normal points to (Mitsuba: cos_theta > 0).
 struct Material {
     Vec3f front{};
     Vec3f back{};
+    // Indices into SceneData::textures: in place of the colours, and the share of the light
+    // that is reflected at all (Mitsuba's `mask`).
+    uint32_t front_texture = NONE, back_texture = NONE, opacity = NONE;
+
+    bool is_textured() const {
+        return front_texture != NONE || back_texture != NONE || opacity != NONE;
+    }
 };
 
 enum class EmitterType : uint32_t { point, spot, directional, area, constant, envmap };
@@ -98,8 +109,12 @@ struct SceneData {
     std::vector<std::array<uint32_t, 3>>
         faces;                  // vertex indices; empty if no shape needs them
     std::vector<Vec3f> normals; // per vertex, unit; empty if no shape needs them
-    std::vector<Shape> shapes;  // ordered by first_face, covering all faces
+    std::vector<Vec2f> uvs;     // per vertex; empty if no shape needs them
+    std::vector<Shape> shapes;  // ordered by first_face, covering all faces, those of
+                                // `objects` too
+    std::shared_ptr<const ObjectSet> objects; // what is not in the tree; maybe none
     std::vector<Material> materials;
+    std::vector<Texture> textures;
     std::vector<Emitter> emitters;
     EnvironmentPicture environment; // of the emitter that is an envmap
     Camera camera;

@@ -1,5 +1,7 @@
 #include "render/shadow.h"
 
+#include "objects/trace_objects.h"
+
 #include <algorithm>
 #include <bit>
 #include <limits>
@@ -58,7 +60,7 @@ void ShadowRays::append(LaneBits lanes, const UIntPacket &ray,
     count_ += uint32_t(std::popcount(lanes));
 }
 
-void ShadowRays::find_occluded(const KdTree &tree, const TraceOptions &options,
+void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &options,
                                Counters &counters, float *cost) {
     RayGroup rays;
     rays.count = count_;
@@ -74,7 +76,9 @@ void ShadowRays::find_occluded(const KdTree &tree, const TraceOptions &options,
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();
     }
-    trace_any(tree, rays, options, occluded_.data(), counters);
+    trace_any(*scene.tree, rays, options, occluded_.data(), counters);
+    if (scene.objects)
+        trace_any_objects(*scene.objects, rays, occluded_.data(), counters);
     for (uint32_t i = 0; cost && i < count_; ++i)
         cost[ray_[i]] += cost_[i];
 }

@@ -34,11 +34,11 @@ public:
     // Calls visible(ray, light) for all that nothing occludes, in the order given. What
     // tracing takes is added to cost[ray] if `cost` is given.
     template <typename Visible>
-    void trace(const KdTree &tree, const TraceOptions &options, Counters &counters,
+    void trace(const SceneData &scene, const TraceOptions &options, Counters &counters,
                float *cost, Visible &&visible) {
         if (count_ == 0)
             return;
-        find_occluded(tree, options, counters, cost);
+        find_occluded(scene, options, counters, cost);
         for (uint32_t i = 0; i < count_; ++i)
             if (!occluded_[i])
                 visible(ray_[i], Vec3f{light_[0][i], light_[1][i], light_[2][i]});
@@ -46,8 +46,8 @@ public:
 
 private:
     void reserve(size_t size);
-    void find_occluded(const KdTree &tree, const TraceOptions &options, Counters &counters,
-                       float *cost);
+    void find_occluded(const SceneData &scene, const TraceOptions &options,
+                       Counters &counters, float *cost);
 
     bool from_light_;
     Vec3f light_position_;

@@ -39,6 +39,9 @@
 // The far end of a ray is not quite where it should be: its direction d = fl(S' - S) is off
 // by u |d_k|, which adds to the e_k of that end.
 //
+// Points of analytic shapes and of instances have errors of their own, see
+// render/object_surface.h.
+//
 // Where numbers become denormal, rounding errors are not relative but up to 2^-150.
 #pragma once
 

@@ -2,15 +2,12 @@
 
 #include "render/shadow_offset.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace mlrt {
 
 namespace {
-
-// A point of a plane, and how far rounding may have taken it off.
-template <typename Double>
-struct PlanePoint {
-    Vec3<Double> p, normal, error;
-};
 
 template <typename Double>
 Vec3<Double> scaled_absolute(const Vec3<Double> &v, double factor) {
@@ -19,8 +16,8 @@ Vec3<Double> scaled_absolute(const Vec3<Double> &v, double factor) {
 }
 
 template <typename Double>
-PlanePoint<Double> plane_of(const Corners<Double> &corners) {
-    PlanePoint<Double> plane;
+SurfacePlane<Double> plane_of(const Corners<Double> &corners) {
+    SurfacePlane<Double> plane;
     plane.p = corners.a;
     plane.normal = normalize(cross(corners.b - corners.a, corners.c - corners.a));
     for (int k = 0; k < 3; ++k)
@@ -35,19 +32,6 @@ Corners<DoubleOf<Real>> double_corners(const Corners<Real> &corners) {
     return {to_double(corners.a), to_double(corners.b), to_double(corners.c)};
 }
 
-// The hit is interpolated from the vertices, so that it lies in the plane however far the
-// ray has come.
-template <typename Real>
-PlanePoint<DoubleOf<Real>> hit_in_double(const PreparedScene &scene,
-                                         const HitRays<Real> &hits) {
-    const Corners<Real> corners = corners_of(scene, hits.faces);
-    const auto weights = double_barycentrics_of(hits.origin, hits.direction, corners);
-    const auto [a, b, c] = double_corners(corners);
-    PlanePoint<DoubleOf<Real>> point = plane_of<DoubleOf<Real>>({a, b, c});
-    point.p = (a + weights.x * (b - a)) + weights.y * (c - a);
-    return point;
-}
-
 uint32_t any_of(uint32_t face) {
     return face;
 }
@@ -55,16 +39,41 @@ uint32_t any_of(const FaceNumbers &faces) {
     return faces[0];
 }
 
+// Samples of an analytic shape, put back onto it.
+SurfacePlane<double> beside_analytic(const AnalyticShape &shape, Vec3d target) {
+    const AnalyticPoint point = point_on(shape, target);
+    return {point.p, point.normal, analytic_error(shape)};
+}
+SurfacePlane<DoublePacket> beside_analytic(const AnalyticShape &shape,
+                                           const Vec3<DoublePacket> &targets) {
+    SurfacePlane<DoublePacket> points;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const SurfacePlane<double> one =
+            beside_analytic(shape, Vec3d{targets.x.entry(lane), targets.y.entry(lane),
+                                         targets.z.entry(lane)});
+        for (int k = 0; k < 3; ++k) {
+            points.p[k].entry(lane) = one.p[k];
+            points.normal[k].entry(lane) = one.normal[k];
+            points.error[k].entry(lane) = one.error[k];
+        }
+    }
+    return points;
+}
+
 // The sample, put back into the plane of its face. The normal is zero if there is none.
 template <typename Real>
-PlanePoint<DoubleOf<Real>> target_in_double(const PreparedScene &scene, uint32_t emitter,
-                                            const EmitterSample<Real> &light) {
+SurfacePlane<DoubleOf<Real>> target_in_double(const PreparedScene &scene, uint32_t emitter,
+                                              const EmitterSample<Real> &light) {
     using Double = DoubleOf<Real>;
     const auto target = to_double(light.target);
     const Double zero(0.0);
     if (any_of(light.target_face) == NONE)
         return {target, {zero, zero, zero}, {zero, zero, zero}};
-    PlanePoint<Double> point =
+    const uint32_t face = any_of(light.target_face);
+    if (scene.is_on_object(face))
+        return beside_analytic(
+            *scene.analytic(scene.data.shapes[scene.shape_of_face[face]]), target);
+    SurfacePlane<Double> point =
         plane_of(double_corners(corners_of(scene, light.target_face)));
     point.p = target - point.normal * dot(point.normal, target - point.p);
     for (int k = 0; k < 3; ++k)
@@ -75,10 +84,37 @@ PlanePoint<DoubleOf<Real>> target_in_double(const PreparedScene &scene, uint32_t
 
 } // namespace
 
+// The hit is interpolated from the vertices, so that it lies in the plane however far the
+// ray has come.
 template <typename Real>
-ShadowSegment<Real> robust_segment(const PreparedScene &scene, const HitRays<Real> &hits,
+SurfacePlane<DoubleOf<Real>> plane_at(const Vec3<Real> &origin, const Vec3<Real> &direction,
+                                      const Corners<Real> &corners) {
+    const auto weights = double_barycentrics_of(origin, direction, corners);
+    const auto [a, b, c] = double_corners(corners);
+    SurfacePlane<DoubleOf<Real>> point = plane_of<DoubleOf<Real>>({a, b, c});
+    point.p = (a + weights.x * (b - a)) + weights.y * (c - a);
+    return point;
+}
+
+template <typename Real>
+SurfacePlane<DoubleOf<Real>> hit_plane(const PreparedScene &scene,
+                                       const HitRays<Real> &hits) {
+    return plane_at(hits.origin, hits.direction, corners_of(scene, hits.faces));
+}
+
+Vec3d analytic_error(const AnalyticShape &shape) {
+    constexpr double SHARE = 0x1p-30;
+    Vec3d error;
+    for (int k = 0; k < 3; ++k)
+        error[k] = SHARE * std::max(std::abs(double(shape.box.lo[k])),
+                                    std::abs(double(shape.box.hi[k])));
+    return error;
+}
+
+template <typename Real>
+ShadowSegment<Real> robust_segment(const PreparedScene &scene,
+                                   const SurfacePlane<DoubleOf<Real>> &hit,
                                    uint32_t emitter, const EmitterSample<Real> &light) {
-    const auto hit = hit_in_double(scene, hits);
     const auto target = target_in_double(scene, emitter, light);
     const auto way = target.p - hit.p;
     // Of a ray's direction, hence of its far end.
@@ -94,18 +130,24 @@ ShadowSegment<Real> robust_segment(const PreparedScene &scene, const HitRays<Rea
 }
 
 template <typename Real>
-Vec3<Real> robust_passage(const PreparedScene &scene, const HitRays<Real> &hits) {
-    const auto hit = hit_in_double(scene, hits);
-    return point_beside_plane<Real>(hit.p, hit.normal, hit.error,
-                                    to_double(hits.direction));
+Vec3<Real> robust_passage(const SurfacePlane<DoubleOf<Real>> &hit,
+                          const Vec3<Real> &direction) {
+    return point_beside_plane<Real>(hit.p, hit.normal, hit.error, to_double(direction));
 }
 
-template ShadowSegment<float> robust_segment(const PreparedScene &, const HitRays<float> &,
-                                             uint32_t, const EmitterSample<float> &);
+template SurfacePlane<double> plane_at(const Vec3f &, const Vec3f &,
+                                       const Corners<float> &);
+template SurfacePlane<double> hit_plane(const PreparedScene &, const HitRays<float> &);
+template SurfacePlane<DoublePacket> hit_plane(const PreparedScene &,
+                                              const HitRays<FloatPacket> &);
+template ShadowSegment<float> robust_segment(const PreparedScene &,
+                                             const SurfacePlane<double> &, uint32_t,
+                                             const EmitterSample<float> &);
 template ShadowSegment<FloatPacket> robust_segment(const PreparedScene &,
-                                                   const HitRays<FloatPacket> &, uint32_t,
+                                                   const SurfacePlane<DoublePacket> &,
+                                                   uint32_t,
                                                    const EmitterSample<FloatPacket> &);
-template Vec3<FloatPacket> robust_passage(const PreparedScene &,
-                                          const HitRays<FloatPacket> &);
+template Vec3<FloatPacket> robust_passage(const SurfacePlane<DoublePacket> &,
+                                          const Vec3<FloatPacket> &);
 
 } // namespace mlrt

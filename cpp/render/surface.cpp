@@ -157,6 +157,16 @@ FaceNumbers faces_in(const UIntPacket &faces, LaneBits lanes) {
     return numbers;
 }
 
+SurfacePoint<float> triangle_surface(Vec3f origin, Vec3f direction,
+                                     const Corners<float> &corners,
+                                     const Corners<float> *normals) {
+    const Vec2f at = barycentrics_of(origin, direction, corners);
+    SurfacePoint<float> point = on_face(at, corners);
+    if (normals)
+        point.shading_normal = interpolated_normal(at, *normals, point.face_normal);
+    return point;
+}
+
 SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
                                 uint32_t face) {
     return on_one_face(scene, origin, direction, face);

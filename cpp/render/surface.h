@@ -27,7 +27,8 @@ struct SurfacePoint {
     Vec3<Real> shading_normal; // unit
 };
 
-// The surface that a ray is known to hit.
+// The surface that a ray is known to hit. Faces are those of the scene's tree here and
+// below; see object_surface.h for others.
 SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
                                 uint32_t face);
 
@@ -37,6 +38,12 @@ template <typename Origin>
 SurfacePoint<FloatPacket>
 hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
              const Vec3<FloatPacket> &direction, const UIntPacket &faces, LaneBits lanes);
+
+// A triangle that a ray is known to hit. `normals` are those of its vertices; without, the
+// face normal serves.
+SurfacePoint<float> triangle_surface(Vec3f origin, Vec3f direction,
+                                     const Corners<float> &corners,
+                                     const Corners<float> *normals);
 
 Corners<float> corners_of(const PreparedScene &scene, uint32_t face);
 Corners<FloatPacket> corners_of(const PreparedScene &scene, const FaceNumbers &faces);

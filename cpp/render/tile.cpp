@@ -1,8 +1,10 @@
 #include "render/tile.h"
 
+#include "objects/trace_objects.h"
 #include "render/emitter_sampling.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
+#include "render/textured_material.h"
 
 #include <algorithm>
 #include <limits>
@@ -79,6 +81,8 @@ void TileRenderer::make_room() {
     primitive_.resize(padded);
     std::fill(primitive_.begin() + ptrdiff_t(samples_.count()), primitive_.end(),
               NO_PRIMITIVE);
+    if (scene_.data.objects)
+        instance_.resize(padded, NO_INSTANCE);
     values_.resize(target_.channels.count);
     for (std::vector<float> &channel : values_)
         channel.assign(padded, 0.0f);
@@ -110,10 +114,19 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
     tile.size = group.side;
     tile.samples = group.sample_count;
     const bool is_square = rays.has_common_origin && group.side > 0 && x >= 0 && y >= 0;
-    const bool wants_distances = target_.channels.depth >= 0;
-    trace_closest(*scene_.data.tree, rays, options_,
-                  HitGroup{wants_distances ? t_.data() : nullptr, primitive_.data()},
-                  counters_.primary, is_square ? &tile : nullptr);
+    const bool wants_distances = target_.channels.depth >= 0 || scene_.data.objects;
+    trace(rays, is_square ? &tile : nullptr, wants_distances ? t_.data() : nullptr,
+          primitive_.data(), instance_.data());
+}
+
+// Instances are written only if the scene has objects, and distances are needed then.
+void TileRenderer::trace(const RayGroup &rays, const CameraTile *tile, float *t,
+                         uint32_t *primitive, uint32_t *instance) {
+    trace_closest(*scene_.data.tree, rays, options_, HitGroup{t, primitive},
+                  counters_.primary, tile);
+    if (scene_.data.objects)
+        trace_closest_objects(*scene_.data.objects, rays, {t, primitive, instance},
+                              counters_.primary);
 }
 
 // What rays see that meet nothing.
@@ -136,6 +149,7 @@ void TileRenderer::add_background() {
 void TileRenderer::shade_hits() {
     HitPacket hit;
     hit.origin = in_all_lanes(scene_.plane.origin);
+    const bool common_origin = scene_.plane.has_common_origin();
     const UIntPacket lane_number(lane_numbers());
     for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
         hit.faces = load<UIntPacket>(&primitive_[first]);
@@ -145,21 +159,17 @@ void TileRenderer::shade_hits() {
         hit.ray = UIntPacket(uint32_t(first)) + lane_number;
         for (int k = 0; k < 3; ++k)
             hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
+        for (int k = 0; k < 3 && !common_origin; ++k)
+            hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
         hit.first = first;
-        const SurfacePoint<FloatPacket> point = surfaces_of(hit);
+        if (scene_.data.objects) {
+            hit.t = load<FloatPacket>(&t_[first]);
+            hit.instances = load<UIntPacket>(&instance_[first]);
+        }
+        const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, common_origin);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
-}
-
-// The surfaces that camera rays hit, whose origins are filled in if they are not common.
-SurfacePoint<FloatPacket> TileRenderer::surfaces_of(HitPacket &hit) const {
-    if (scene_.plane.has_common_origin())
-        return hit_surfaces(scene_, scene_.plane.origin, hit.direction, hit.faces,
-                            hit.lanes);
-    for (int k = 0; k < 3; ++k)
-        hit.origin[k] = load<FloatPacket>(samples_.origin(k) + *hit.first);
-    return hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes);
 }
 
 void TileRenderer::write_depth_and_normal(const HitPacket &hit,
@@ -191,7 +201,10 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
 
     LaneBits lanes =
         add_emission(hit, point, shapes, seen_from_front) & to_bits(cos_view != zero);
-    const Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
+    Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
+    if (scene_.any_material_is_textured)
+        albedo = textured_albedo(scene_, {hit.origin, hit.direction, hit.faces, shapes},
+                                 lanes, seen_from_front, albedo);
     lanes &= not_black(albedo);
     if (lanes == 0 || shadows_.empty())
         return;
@@ -221,9 +234,8 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
             return;
         ShadowSegment<FloatPacket> segment;
         if (offset_ == ShadowOffset::robust) {
-            const FaceNumbers faces = faces_in(hit.faces, hit.lanes);
-            segment = robust_segment<FloatPacket>(
-                scene_, {hit.origin, hit.direction, faces}, emitter, light);
+            segment =
+                robust_segment<FloatPacket>(scene_, plane_of(scene_, hit), emitter, light);
         } else {
             segment = {offset_point(point.p, point.face_normal, light.target - point.p),
                        light.target};
@@ -260,8 +272,7 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     if (hidden != 0) {
         const Vec3<FloatPacket> start =
             offset_ == ShadowOffset::robust
-                ? robust_passage<FloatPacket>(
-                      scene_, {hit.origin, hit.direction, faces_in(hit.faces, hit.lanes)})
+                ? robust_passage<FloatPacket>(plane_of(scene_, hit), hit.direction)
                 : offset_point(point.p, point.face_normal, hit.direction);
         for_each_lane(hidden, [&](uint32_t lane) {
             passing_.ray.push_back(rays[lane]);
@@ -285,7 +296,12 @@ void TileRenderer::pass_hidden_emitters() {
                 d[k].push_back(samples_.direction(k)[ray]);
         const std::vector<float> t_min(count, 0.0f);
         const std::vector<float> t_max(count, std::numeric_limits<float>::max());
-        std::vector<uint32_t> primitive(count);
+        Hits hits;
+        hits.primitive.resize(count);
+        if (scene_.data.objects) {
+            hits.t.resize(count);
+            hits.instance.resize(count);
+        }
 
         RayGroup group;
         group.count = uint32_t(count);
@@ -295,26 +311,28 @@ void TileRenderer::pass_hidden_emitters() {
         }
         group.t_min = t_min.data();
         group.t_max = t_max.data();
-        trace_closest(*scene_.data.tree, group, options_,
-                      HitGroup{nullptr, primitive.data()}, counters_.primary);
+        trace(group, nullptr, scene_.data.objects ? hits.t.data() : nullptr,
+              hits.primitive.data(), hits.instance.data());
         for (size_t first = 0; first < count; first += PACKET_WIDTH)
-            shade_passed(passing, primitive, first);
+            shade_passed(passing, hits, first);
     }
 }
 
-void TileRenderer::shade_passed(const PassingRays &passing,
-                                const std::vector<uint32_t> &primitive, size_t first) {
+void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
+                                size_t first) {
     HitPacket hit;
-    LaneArray<uint32_t> rays, faces;
-    LaneArray<float> origin[3], d[3];
+    LaneArray<uint32_t> rays, faces, instances;
+    LaneArray<float> origin[3], d[3], t;
     // Lanes behind the last ray repeat it.
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
         const size_t i = std::min(first + lane, passing.ray.size() - 1);
         const uint32_t ray = passing.ray[i];
-        const bool hits = i == first + lane && primitive[i] != NO_PRIMITIVE;
-        hit.lanes |= LaneBits(hits) << lane;
+        const bool is_hit = i == first + lane && hits.primitive[i] != NO_PRIMITIVE;
+        hit.lanes |= LaneBits(is_hit) << lane;
         rays[lane] = ray;
-        faces[lane] = primitive[i];
+        faces[lane] = hits.primitive[i];
+        t[lane] = scene_.data.objects ? hits.t[i] : 0;
+        instances[lane] = scene_.data.objects ? hits.instance[i] : NO_INSTANCE;
         for (int k = 0; k < 3; ++k) {
             origin[k][lane] = passing.origin[k][i];
             d[k][lane] = samples_.direction(k)[ray];
@@ -328,14 +346,16 @@ void TileRenderer::shade_passed(const PassingRays &passing,
     }
     hit.ray = load<UIntPacket>(rays);
     hit.faces = load<UIntPacket>(faces);
-    shade(hit, hit_surfaces(scene_, hit.origin, hit.direction, hit.faces, hit.lanes));
+    hit.t = load<FloatPacket>(t);
+    hit.instances = load<UIntPacket>(instances);
+    shade(hit, surface_of(scene_, hit, false));
 }
 
 void TileRenderer::add_reflected_light() {
     float *cost = target_.cost ? cost_.data() : nullptr;
     float *red = values_[0].data(), *green = values_[1].data(), *blue = values_[2].data();
     for (ShadowRays &shadow : shadows_)
-        shadow.trace(*scene_.data.tree, options_, counters_.shadow, cost,
+        shadow.trace(scene_.data, options_, counters_.shadow, cost,
                      [&](uint32_t ray, Vec3f light) {
                          red[ray] += light.x;
                          green[ray] += light.y;

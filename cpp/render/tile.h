@@ -6,6 +6,7 @@
 #include "base/counters.h"
 #include "mlrta/trace.h"
 #include "render/camera_samples.h"
+#include "render/hit_packet.h"
 #include "render/picture_film.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
@@ -13,10 +14,8 @@
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
 #include "render/spread_samples.h"
-#include "render/surface.h"
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -76,14 +75,6 @@ public:
     const RenderCounters &counters() const { return counters_; }
 
 private:
-    // Up to sixteen rays that meet a surface.
-    struct HitPacket {
-        LaneBits lanes = 0;
-        std::optional<size_t> first; // ray in lane 0, if the others follow it
-        UIntPacket ray, faces;
-        Vec3<FloatPacket> origin, direction;
-    };
-
     // Camera rays that go on behind an emitter that is to be hidden.
     struct PassingRays {
         std::vector<uint32_t> ray;
@@ -94,7 +85,6 @@ private:
     void trace_camera_rays(const PixelGroup &group);
     void add_background();
     void shade_hits();
-    SurfacePoint<FloatPacket> surfaces_of(HitPacket &hit) const;
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
     void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
@@ -104,8 +94,14 @@ private:
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
     void pass_hidden_emitters();
-    void shade_passed(const PassingRays &passing, const std::vector<uint32_t> &primitive,
-                      size_t first);
+    // What rays hit, by ray; distances and instances only if they are wanted.
+    struct Hits {
+        std::vector<float> t;
+        std::vector<uint32_t> primitive, instance;
+    };
+    void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
+               uint32_t *instance);
+    void shade_passed(const PassingRays &passing, const Hits &hits, size_t first);
     void add_reflected_light();
     void write(const PixelGroup &group);
 
@@ -119,8 +115,9 @@ private:
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.
-    std::vector<float> t_; // if the depth is wanted
+    std::vector<float> t_; // if the depth is wanted, or the scene has objects
     std::vector<uint32_t> primitive_;
+    std::vector<uint32_t> instance_;         // if the scene has objects
     std::vector<float> cost_;                // if it is wanted
     std::vector<std::vector<float>> values_; // by channel of the film
 

@@ -21,11 +21,9 @@ from ..render import (
     as_depth,
     check_aovs,
     checked_seed,
-    checked_spp,
     chosen_shadow_offset,
-    own_spp,
-    rounded,
 )
+from ..samplers import checked_spp, own_spp, rounded
 from ..scene_arrays import Lighting, same_geometry
 from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree

@@ -306,15 +306,15 @@ def test_interruption_within_mitsuba_is_no_error_of_the_scene(
 
 def test_all_that_is_not_supported_is_named(scene_file: SceneFile) -> None:
     path = scene_file(
-        shapes="""<shape type="sphere" id="ball"><bsdf type="plastic" id="shiny"/></shape>
-<shape type="cylinder" id="tube"/><shape type="cylinder"/>""",
+        shapes="""<shape type="sdfgrid" id="ball"><bsdf type="plastic" id="shiny"/></shape>
+<shape type="linearcurve" id="hair"/><shape type="linearcurve"/>""",
     )
     with pytest.raises(UnsupportedFeature) as caught:
         import_scene(path)
     text = message_of(caught)
-    assert text.startswith(f"shape 'sphere' with id 'ball' at {path} line 13:2 is not")
-    assert "bsdf 'plastic' 'shiny' line 13:33;" in text
-    assert "shape 'cylinder' 'tube' line 14:2, line 14:36" in text
+    assert text.startswith(f"shape 'sdfgrid' with id 'ball' at {path} line 13:2 is not")
+    assert "bsdf 'plastic' 'shiny' line 13:34;" in text
+    assert "shape 'linearcurve' 'hair' line 14:2, line 14:39" in text
 
 
 def test_integrator_is_named_with_its_place(scene_file: SceneFile) -> None:

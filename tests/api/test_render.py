@@ -221,8 +221,8 @@ def test_arguments(scene_file: SceneFile) -> None:
     for seed in (-1, 2**32):
         with pytest.raises(MlrtError, match="seed = "):
             render(path, seed=seed)
-    with pytest.raises(UnsupportedFeature, match="sphere"):
-        render(scene_file("sphere.xml", shapes='<shape type="sphere"/>'), shading="native")
+    with pytest.raises(UnsupportedFeature, match="sdfgrid"):
+        render(scene_file("grid.xml", shapes='<shape type="sdfgrid"/>'), shading="native")
     with pytest.raises(MlrtError, match="shading = 'fast' does not exist"):
         render(path, shading="fast")
 

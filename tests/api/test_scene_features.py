@@ -45,21 +45,40 @@ def test_approximations_are_named(
 
 
 UNSUPPORTED = {
-    "sphere": {"shapes": '<shape type="sphere" id="ball"/>'},
+    "sphere": {
+        "shapes": '<shape type="sphere" id="ball"><bsdf type="diffuse">'
+        '<texture type="checkerboard" name="reflectance"/></bsdf></shape>'
+    },
+    "shapegroup": {
+        "shapes": '<shape type="shapegroup" id="group"><shape type="cube">'
+        '<bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape></shape>'
+        '<shape type="instance"><ref id="group"/></shape>'
+    },
+    "sdfgrid": {"shapes": '<shape type="sdfgrid" id="ball"/>'},
     "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
     "envmap": {
         "emitters": '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
         '<boolean name="mis_compensation" value="true"/></emitter>'
     },
-    "bitmap": {
+    "volume": {
         "shapes": '<shape type="rectangle"><bsdf type="diffuse">'
-        '<texture type="bitmap" name="reflectance" id="wood">'
-        '<string name="filename" value="wood.png"/></texture></bsdf></shape>'
+        '<texture type="volume" name="reflectance" id="wood">'
+        '<volume type="constvolume" name="volume"/></texture></bsdf></shape>'
     },
-    "conductor": {"shapes": '<shape type="cube"><bsdf type="conductor" id="tin"/></shape>'},
+    "area": {
+        "shapes": '<shape type="rectangle"><emitter type="area" id="screen">'
+        '<texture type="checkerboard" name="radiance"/></emitter></shape>'
+    },
+    "roughconductor": {
+        "shapes": '<shape type="cube"><bsdf type="roughconductor" id="tin"/></shape>'
+    },
     "twosided": {
         "shapes": '<shape type="cube"><bsdf type="twosided"><bsdf type="plastic"/></bsdf>'
         "</shape>"
+    },
+    "mask": {
+        "shapes": '<shape type="cube"><bsdf type="mask"><bsdf type="mask">'
+        '<bsdf type="diffuse"/></bsdf></bsdf></shape>'
     },
     "orthographic": {
         "sensor": scene_files.SENSOR.replace("perspective", "orthographic").replace(

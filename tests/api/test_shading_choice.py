@@ -42,7 +42,7 @@ def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
     ("parts", "reason"),
     [
         ({"shapes": SHINY}, r"bsdf 'plastic' with id 'shiny' at .*:21 is not native"),
-        ({"shapes": '<shape type="sphere" id="ball"/>'}, "shape 'sphere' with id 'ball'"),
+        ({"shapes": '<shape type="sdfgrid" id="ball"/>'}, "shape 'sdfgrid' with id 'ball'"),
         ({"integrator": NO_EMITTER_SAMPLES}, "integrator 'direct'.*no emitter samples"),
         (
             {"integrator": integrator("mlrt", "integer", "bsdf_samples", 2)},
@@ -52,7 +52,7 @@ def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
             {"integrator": integrator("direct", "integer", "emitter_samples", 257)},
             "emitter_samples = 257, and at most 256 are taken natively",
         ),
-        ({"shapes": SHINY + '<shape type="disk"/>'}, "'plastic'.*, and 1 more$"),
+        ({"shapes": SHINY + '<shape type="sdfgrid"/>'}, "'plastic'.*, and 1 more$"),
     ],
 )
 def test_reasons_for_mitsuba_are_named(

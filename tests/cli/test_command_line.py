@@ -92,9 +92,9 @@ def test_missing_scene(command: str, capsys: pytest.CaptureFixture[str]) -> None
 def test_unsupported_feature(
     scene_file: SceneFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = scene_file(shapes='<shape type="sphere" id="ball"/>')
+    path = scene_file(shapes='<shape type="sdfgrid" id="ball"/>')
     line = failure(["render", str(path), "--shading", "native"], 1, capsys)
-    assert "shape 'sphere' with id 'ball'" in line
+    assert "shape 'sdfgrid' with id 'ball'" in line
     assert str(path) in line
 
 
@@ -131,12 +131,12 @@ def test_info_of_another_scene(
     scene_file: SceneFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = scene_file(
-        shapes='<shape type="sphere" id="ball"><bsdf type="plastic" id="shiny"/></shape>',
+        shapes='<shape type="sdfgrid" id="ball"><bsdf type="plastic" id="shiny"/></shape>',
         integrator='<integrator type="path"/>',
     )
     assert main(["info", str(path)]) == 0
     text = capsys.readouterr().out
-    for expected in ("sphere' with id 'ball", "plastic' with id 'shiny", "max_depth = -1"):
+    for expected in ("sdfgrid' with id 'ball", "plastic' with id 'shiny", "max_depth = -1"):
         assert expected in text
 
 

@@ -146,7 +146,7 @@ def test_instances_beyond_measure_are_refused(assets: Path) -> None:
         )
     )
     with pytest.raises(UnsupportedFeature, match="10000 instances that cannot be written"):
-        render(path)
+        render(path, shading="mitsuba")
 
 
 def test_variants_that_cannot_shade_are_named(assets: Path) -> None:

@@ -48,7 +48,7 @@ def test_copies_look_like_instances(assets: Path, name: str) -> None:
 
 def test_copies_are_in_the_tree(assets: Path) -> None:
     path = write(assets / "tree.xml", CUBE * 2, *TURNS.values())
-    report = prepare(path).report
+    report = prepare(path, shading="mitsuba").report
     # The floor, the panel, and all copies of either cube.
     assert report["tree_shapes"] == 4 and report["mitsuba_shapes"] == 0
     assert report["triangles"] == 4 + 2 * 12 * len(TURNS)
@@ -56,11 +56,11 @@ def test_copies_are_in_the_tree(assets: Path) -> None:
 
 def test_groups_of_other_shapes_stay(assets: Path) -> None:
     path = write(assets / "stay.xml", CUBE + '<shape type="sphere"/>', TURNS["turned"])
-    assert prepare(path).report["mitsuba_shapes"] == 1
+    assert prepare(path, shading="mitsuba").report["mitsuba_shapes"] == 1
 
 
 def test_too_many_faces_are_refused(assets: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write(assets / "faces.xml", CUBE, *TURNS.values())
     monkeypatch.setattr(instances, "LARGEST_FACE_COUNT", 40)
     with pytest.raises(UnsupportedFeature, match="4 instances with 48 faces in all"):
-        prepare(path)
+        prepare(path, shading="mitsuba")

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import repository
 
-CPP_ORDER = ["base", "geometry", "kdtree", "traverse", "mlrta", "render", "bind"]
+CPP_ORDER = ["base", "geometry", "kdtree", "traverse", "mlrta", "objects", "render", "bind"]
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
 # Third party: the files that alone may include it, and do.

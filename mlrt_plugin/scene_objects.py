@@ -1,0 +1,233 @@
+"""Analytic shapes, groups and instances of a loaded scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import elements, meshes, parsing
+from . import mitsuba_objects as objects
+from .elements import Element
+from .errors import SceneError
+from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
+from .scene_arrays import NONE, Shape
+
+GROUP = "ShapeGroupPlugin"
+"""Mitsuba's class of the plugin `shapegroup`."""
+ROUND_ENOUGH = 1e-3
+"""How much two axes of a sphere may differ, relatively; chosen."""
+
+
+@dataclass
+class SortedShapes:
+    """The shapes of a scene by the way rays meet them, in the order of declaration.
+
+    instances: with the id of their group each. groups: the shapes of each group that has
+    an instance, by its id, in the order in which they are referred to.
+    """
+
+    meshes: list[Any] = field(default_factory=list)
+    analytic: list[Any] = field(default_factory=list)
+    instances: list[tuple[Any, str]] = field(default_factory=list)
+    groups: dict[str, list[Any]] = field(default_factory=dict)
+
+
+def is_analytic(shape: Any) -> bool:
+    """Whether a loaded shape is met as it is, without triangles."""
+    return objects.plugin_name(shape) in ANALYTIC_TYPES
+
+
+def sorted_shapes(
+    shapes: list[Any], children: Mapping[str, list[Any]], names: Mapping[str, Element]
+) -> SortedShapes:
+    """Sorts loaded shapes.
+
+    children: the shapes of each group, by its id. names: elements by the ids of objects.
+    """
+    ids = {id(element): id_ for id_, element in names.items()}
+    result = SortedShapes()
+    for shape in shapes:
+        if is_analytic(shape):
+            result.analytic.append(shape)
+        elif shape.class_name() == "Instance":
+            (group,) = (ids[id(child)] for _, child in names[shape.id()].children)
+            result.instances.append((shape, group))
+            result.groups.setdefault(group, children[group])
+        elif shape.class_name() != GROUP:
+            result.meshes.append(shape)
+    return result
+
+
+def group_children(
+    parsed: parsing.ParsedScene, names: Mapping[str, Element]
+) -> dict[str, list[Any]]:
+    """The loaded shapes of each group of a scene, by its id.
+
+    names: elements by the ids of objects, as `parsing.instantiate` gives them.
+    """
+    nodes = {
+        id_: parsed.state.nodes[int(id_[1:])]
+        for id_, element in names.items()
+        if element.plugin == "shapegroup"
+    }
+    return {
+        id_: [o for _, o in node.props.objects() if elements.kind_of(o) == "shape"]
+        for id_, node in nodes.items()
+    }
+
+
+def gather_objects(
+    scene: SortedShapes,
+    names: Mapping[str, Element],
+    first_face: int,
+    name_of: Callable[[Any], str],
+    material_of: Callable[[Any], int],
+    warnings: list[str],
+) -> ObjectArrays | None:
+    """Copies what is not in the tree out of loaded shapes; None if there is nothing.
+
+    names: elements by the ids of objects. first_face: how many faces the tree has. name_of:
+    what messages call a shape. material_of: the number of a shape's material. warnings:
+    grows by a sentence on each thing that is approximated.
+
+    Raises SceneError for a shape without an extent and for a mesh that is broken.
+    """
+    if not scene.analytic and not scene.instances:
+        return None
+    shapes: list[Shape] = []
+    shape_names: list[str] = []
+    groups: list[GroupArrays] = []
+    analytic = list(scene.analytic)
+    for children in scene.groups.values():
+        own = [shape for shape in children if not is_analytic(shape)]
+        own_names = [name_of(shape) for shape in own]
+        geometry = meshes.gather(own, own_names)
+        warnings += geometry.warnings
+        groups.append(
+            GroupArrays(
+                geometry.vertices,
+                geometry.faces,
+                geometry.normals,
+                len(children) - len(own),
+            )
+        )
+        analytic += [shape for shape in children if is_analytic(shape)]
+        for number, shape in enumerate(own):
+            shapes.append(
+                Shape(
+                    first_face=first_face + geometry.first_faces[number],
+                    face_count=geometry.face_counts[number],
+                    material=material_of(shape),
+                    vertex_normals=geometry.vertex_normals[number],
+                    flip_normals=geometry.flip_normals[number],
+                )
+            )
+        shape_names += own_names
+        first_face += len(geometry.faces)
+    frames = np.zeros((len(analytic), 3, 4))
+    types = np.zeros(len(analytic), np.uint32)
+    for number, shape in enumerate(analytic):
+        name = name_of(shape)
+        types[number] = ANALYTIC_TYPES.index(objects.plugin_name(shape))
+        frames[number] = frame_of(shape, name, warnings)
+        shapes.append(
+            Shape(
+                first_face=first_face + number,
+                face_count=1,
+                material=material_of(shape),
+                flip_normals=bool(shape.has_flipped_normals()),
+            )
+        )
+        shape_names.append(name)
+    numbers = {group: number for number, group in enumerate(scene.groups)}
+    maps, normals = placements(scene.instances, names)
+    return ObjectArrays(
+        shapes=tuple(shapes),
+        shape_names=tuple(shape_names),
+        analytic_types=types,
+        analytic_frames=frames,
+        scene_analytic_count=len(scene.analytic),
+        groups=tuple(groups),
+        instance_groups=np.array([numbers[g] for _, g in scene.instances], np.uint32),
+        instance_maps=maps,
+        instance_normals=normals,
+    )
+
+
+def frame_of(shape: Any, name: str, warnings: list[str]) -> npt.NDArray[np.float64]:
+    """(3, 4) matrix from the frame of an analytic shape, in which its size is one."""
+    frame = objects.matrix(objects.members(shape)["to_world"])[:3]
+    sizes = np.linalg.norm(frame[:, :3], axis=0)
+    finite = np.isfinite(frame).all()
+    if not finite or abs(np.linalg.det(frame[:, :3])) <= 1e-12 * np.prod(sizes):
+        raise SceneError(
+            f"{name} has no extent, or no place: its radius, the way from p0 to p1 and the "
+            "scales of its to_world must be finite and must not be 0"
+        )
+    if objects.plugin_name(shape) == "sphere":
+        stretch = np.linalg.svd(frame[:, :3], compute_uv=False)
+        if stretch[0] - stretch[2] > ROUND_ENOUGH * stretch[0]:
+            warnings.append(
+                f"{name} has a to_world that makes it an ellipsoid: it is rendered as a "
+                f"sphere of radius {sizes[0]:g}, as in Mitsuba"
+            )
+    return frame
+
+
+def placements(
+    instances: list[tuple[Any, str]], names: Mapping[str, Element]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """(I, 3, 4) maps of points to the world and (I, 3, 3) maps of normals.
+
+    Mitsuba keeps both, and they do not belong together where a scene rotates about an axis
+    that is not of unit length; its image is that of what it keeps.
+    """
+    maps = np.tile(np.eye(3, 4), (len(instances), 1, 1))
+    normals = np.tile(np.eye(3), (len(instances), 1, 1))
+    for number, (instance, _) in enumerate(instances):
+        to_world = names[instance.id()].properties.get("to_world")
+        if to_world is not None:
+            maps[number] = np.array(to_world.matrix)[:3]
+            normals[number] = np.array(to_world.inverse_transpose)[:3, :3]
+    return maps, normals
+
+
+def lights_of_shapes(
+    by_way: SortedShapes, others: ObjectArrays | None, sources: list[Any]
+) -> tuple[list[int], dict[int, int]]:
+    """The number of the shape that each emitter is on, NONE for none, and the number of the
+    emitter of each shape that glows. Shapes are numbered as the core does: meshes, then
+    those of `others`."""
+    glowing = {}
+    for number, shape in enumerate(by_way.meshes):
+        if shape.emitter() is not None:
+            glowing[number] = shape.emitter()
+    if others is not None:
+        first = len(by_way.meshes) + len(others.shapes) - len(others.analytic_types)
+        for number, shape in enumerate(by_way.analytic):
+            if shape.emitter() is not None:
+                glowing[first + number] = shape.emitter()
+    shape_of_emitter = [NONE] * len(sources)
+    emitter_of_shape = {}
+    for number, own in glowing.items():
+        for index, source in enumerate(sources):
+            if own is source:
+                emitter_of_shape[number], shape_of_emitter[index] = index, number
+    return shape_of_emitter, emitter_of_shape
+
+
+def with_lights(
+    others: ObjectArrays | None, first: int, emitter_of_shape: Mapping[int, int]
+) -> ObjectArrays | None:
+    """Objects whose shapes know their emitters; `first` is the number of the first."""
+    if others is None:
+        return None
+    shapes = tuple(
+        replace(shape, emitter=emitter_of_shape.get(first + number, NONE))
+        for number, shape in enumerate(others.shapes)
+    )
+    return replace(others, shapes=shapes)
