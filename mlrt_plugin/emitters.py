@@ -156,7 +156,7 @@ def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> Non
 def check_areas(arrays: SceneArrays) -> None:
     """Raises SceneError for a shape that glows and whose area is not zero, but too small a
     number for single precision, in which it would be dark."""
-    for shape, name in zip(arrays.shapes, arrays.shape_names, strict=True):
+    for number, shape in enumerate(arrays.shapes):
         if shape.emitter == NONE:
             continue
         faces = arrays.faces[shape.first_face : shape.first_face + shape.face_count]
@@ -165,6 +165,8 @@ def check_areas(arrays: SceneArrays) -> None:
             area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
         total = float(np.nansum(area))
         if 0 < total < SMALLEST_AREA:
+            names = arrays.shape_names
+            name = names[number] if number < len(names) else f"shape {number}"
             raise SceneError(
                 f"{name} glows and has an area of {total:.3g}, which is out of the range "
                 "of single precision: scale the scene up or remove the light"

@@ -8,6 +8,7 @@ below and its arguments), and answers each with the path of a .npy file.
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -163,8 +164,9 @@ def nearest_hits(folder: Path, arrays: str, robust: bool) -> Any:
 def main(folder: Path) -> None:
     from mlrt_compare import llvm
 
-    answers = sys.stdout
-    sys.stdout = sys.stderr
+    # Mitsuba's log goes where the answers would, past Python.
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
     try:
         llvm.activate()
         import mitsuba as mi

@@ -39,17 +39,14 @@ class MitsubaRenderer:
         self,
         settings: Settings,
         integrator: Mapping[str, Any] | None = None,
-        keep_sampler: bool = True,
     ) -> None:
-        """integrator: what to render, by default `direct` without BSDF samples.
-        keep_sampler: whether to take the scene's sampler, not `independent`."""
+        """integrator: what to render, by default `direct` without BSDF samples."""
         mi.set_variant(VARIANT)
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings
-        self._keep_sampler = keep_sampler
         start = time.perf_counter()
         with _captured_log() as log:
-            loaded = load_mitsuba_scene(settings, VARIANT, integrator, keep_sampler)
+            loaded = load_mitsuba_scene(settings, VARIANT, integrator)
             dr.sync_thread()
             text = log.read_log()
         seconds = time.perf_counter() - start

@@ -32,18 +32,16 @@ def load_mitsuba_scene(
     settings: Settings,
     variant: str,
     integrator: Mapping[str, Any] | None = None,
-    keep_sampler: bool = True,
 ) -> MitsubaScene:
-    """As mi.load_file does, with sampler, film size and integrator replaced; sets the
+    """As mi.load_file does, with film size and integrator replaced; sets the
     variant.
 
     integrator: what to render, by default `direct` without BSDF samples.
-    keep_sampler: whether to take the scene's sampler, not `independent`. Raises
-    SceneError, one sentence, if Mitsuba cannot load the scene.
+    Raises SceneError, one sentence, if Mitsuba cannot load the scene.
     """
     mi.set_variant(variant)
     try:
-        return _loaded(settings, variant, integrator, keep_sampler)
+        return _loaded(settings, variant, integrator)
     except RuntimeError as error:
         raise SceneError(
             f"Mitsuba cannot load {settings.scene}: {one_sentence(str(error))}"
@@ -54,12 +52,11 @@ def _loaded(
     settings: Settings,
     variant: str,
     integrator: Mapping[str, Any] | None,
-    keep_sampler: bool,
 ) -> MitsubaScene:
     config = mi.parser.ParserConfig(variant)
     with resolving_from(settings.scene.parent, *settings.folders):
         state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
-        _align(state, settings, keep_sampler)
+        _align(state, settings)
         hide_emitters = bool(_of_integrator(state, "hide_emitters", False))
         emitter_samples = max(1, int(_of_integrator(state, "emitter_samples", 1)))
         # Merging moves meshes to the end, and lights with them; the order of the
@@ -92,18 +89,10 @@ def _of_integrator(state: Any, name: str, otherwise: Any) -> Any:
     return otherwise
 
 
-def _align(state: Any, settings: Settings, keep_sampler: bool) -> None:
-    """Gives every sensor the wanted size, and the independent sampler if its own is not to
-    be kept."""
+def _align(state: Any, settings: Settings) -> None:
+    """Gives every film the wanted size."""
     for node in state.nodes:
-        if node.type == mi.ObjectType.Sampler and not keep_sampler:
-            sampler = mi.Properties("independent")
-            sampler.set_id(node.props.id())
-            for key in ("sample_count", "seed"):
-                if key in node.props:
-                    sampler[key] = node.props[key]
-            node.props = sampler
-        elif node.type == mi.ObjectType.Film:
+        if node.type == mi.ObjectType.Film:
             node.props["pixel_format"] = "rgb"
             if settings.resolution is not None:
                 node.props["width"], node.props["height"] = settings.resolution

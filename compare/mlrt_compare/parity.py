@@ -83,7 +83,7 @@ def parity(settings: Settings) -> Parity:
     ours = MlrtRenderer(settings)
     if ours.spp > MOST_SUMMANDS:
         raise CannotRun(f"rays are told apart up to {MOST_SUMMANDS} spp, not {ours.spp}")
-    theirs = MitsubaRenderer(settings, ours.integrator, ours.by_mitsuba)
+    theirs = MitsubaRenderer(settings, ours.integrator)
     first, mitsuba_first = ours.frame(), theirs.frame()
     frames, mitsuba_frames = interleave(ours.frame, theirs.frame, ROUNDS)
     image, reference = ours.image, theirs.image

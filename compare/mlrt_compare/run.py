@@ -104,7 +104,7 @@ def compare(
             return result
 
         mlrt = step(lambda: MlrtRenderer(settings))
-        mitsuba = step(lambda: MitsubaRenderer(settings, mlrt.integrator, mlrt.by_mitsuba))
+        mitsuba = step(lambda: MitsubaRenderer(settings, mlrt.integrator))
         first_mlrt, first_mitsuba = step(mlrt.frame), step(mitsuba.frame)
         frames_mlrt, frames_mitsuba = interleave(
             lambda: step(mlrt.frame), lambda: step(mitsuba.frame), rounds

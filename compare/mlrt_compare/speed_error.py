@@ -101,9 +101,7 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
             return result
 
         mlrt = stepped(lambda: MlrtRenderer(settings))
-        mitsuba = stepped(
-            lambda: MitsubaRenderer(settings, mlrt.integrator, mlrt.by_mitsuba)
-        )
+        mitsuba = stepped(lambda: MitsubaRenderer(settings, mlrt.integrator))
         renderers: tuple[Renderer, Renderer] = (mlrt, mitsuba)
         first = [
             tuple(stepped(partial(renderer.frame, spp=spp)) for spp in plan.spp)

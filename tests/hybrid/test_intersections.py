@@ -88,7 +88,6 @@ def test_pixels_differ_only_where_hits_do(
             "emitter_samples": lighting.emitter_samples,
             "bsdf_samples": lighting.bsdf_samples,
         },
-        keep_sampler=True,
     )
     reference.frame()
     noted = np.logical_or.reduce(notes).reshape(SIZE[1], SIZE[0], SPP)

@@ -80,7 +80,6 @@ def assert_parity(path: Path, **integrator: int) -> None:
     reference = MitsubaRenderer(
         Settings(path, seed=SEED),
         {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0, **integrator},
-        keep_sampler=True,
     )
     reference.frame()
     assert image.shape == reference.image.shape and image.max() > 0

@@ -39,7 +39,6 @@ def test_image_is_that_of_direct(assets: Path, name: str) -> None:
     reference = MitsubaRenderer(
         Settings(path, seed=SEED),
         {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1},
-        keep_sampler=True,
     )
     reference.frame()
     assert image.shape == reference.image.shape and image.max() > 0
