@@ -4,7 +4,6 @@
 
 #include "base/exactness.h"
 #include "mlrta/beam_leaf.h"
-#include "mlrta/beam_triangle_tests.h"
 #include "mlrta/packet_tracer.h"
 
 #include <bit>

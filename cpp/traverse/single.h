@@ -1,4 +1,4 @@
-// One ray at a time: the plain reference that the packet traversals are measured against.
+// One ray at a time: for rays that have little in common.
 #pragma once
 
 #include "base/counters.h"

@@ -18,6 +18,7 @@ from .exact_hits import exact_distances
 from .hit_contenders import HitContender, embree_contenders
 from .native import Native
 from .offset_scene import ball
+from .wrong_hits import FAR_OFF
 
 FloatArray = npt.NDArray[np.float32]
 HitArrays = tuple[FloatArray, npt.NDArray[np.int64]]
@@ -52,8 +53,6 @@ RUN = 1024
 JUDGED = 10_000
 """Rays whose hits differ that exact arithmetic looks at, at most; chosen, for a tenth of a
 second."""
-FAR = 2.0**-20
-"""Share of the distance by which hits are off that count as wrong; chosen, for rounding."""
 
 
 @dataclass(frozen=True)
@@ -246,5 +245,5 @@ def far_off(
     far = np.zeros(len(t), bool)
     hit = face >= 0
     distance = exact_t[hit].astype(np.float64)
-    far[hit] = ~(np.abs(t[hit] - distance) <= FAR * distance)
+    far[hit] = ~(np.abs(t[hit] - distance) <= FAR_OFF * distance)
     return far

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .kernels import KERNELS, USUAL
+from .markdown import table
 
 Row = dict[str, Any]
 FAST, DOUBLE, EXACT = (KERNELS[name] for name in ("single", "double", "exact"))
@@ -74,9 +75,8 @@ def summary_lines(figures: dict[str, Any]) -> list[str]:
         *("", "Mrays/s, pixels", "Mrays/s, shadows", "wrong hits of 10^9"),
         *("t error, ulps", "leaking rays", "acne pixels", "leaking pixels"),
     )
-    lines = [f"| {' | '.join(head)} |", "|---|" + "--:|" * (len(head) - 1)]
-    for row in summary(figures):
-        cells = (
+    rows = [
+        (
             row["name"],
             f"{row['rays_per_second'] / 1e6:.2f}",
             f"{row['shadow_rays_per_second'] / 1e6:.2f}",
@@ -86,5 +86,6 @@ def summary_lines(figures: dict[str, Any]) -> list[str]:
             f"{row['acne_pixels']:,} of {row['lit_pixels']:,}",
             f"{row['leak_pixels']:,} of {row['dark_pixels']:,}",
         )
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+        for row in summary(figures)
+    ]
+    return table(head, rows)
