@@ -46,19 +46,22 @@ class RayContender:
         return f"{self.engine} {self.kind}".strip()
 
 
+def mlrt_variant(
+    tree: Any, trace: dict[str, Any], tile: int, own_view: Any = None
+) -> Variant:
+    """``own_view``: in place of the view that is given when it runs."""
+
+    def render(view: Any, image: Any, **keywords: Any) -> Any:
+        chosen = view if own_view is None else own_view
+        return tree.render(chosen, trace, image, tile=tile, **keywords)
+
+    return Variant("group", tile, render)
+
+
 def ray_contenders(
     tree: Any, scenes: dict[str, Any], trace: dict[str, Any], tiles: Sequence[int]
 ) -> list[RayContender]:
     """``scenes``: Embree's, by build quality. ``trace``: options of MLRT's tracer."""
-
-    def mlrt(tile: int) -> Variant:
-        return Variant(
-            "group",
-            tile,
-            lambda view, image, **keywords: tree.render(
-                view, trace, image, tile=tile, **keywords
-            ),
-        )
 
     def embree(scene: Any, call: str, tile: int) -> Variant:
         return Variant(
@@ -69,7 +72,9 @@ def ray_contenders(
             ),
         )
 
-    contenders = [RayContender(MLRT, "", [mlrt(tile) for tile in tiles])]
+    contenders = [
+        RayContender(MLRT, "", [mlrt_variant(tree, trace, tile) for tile in tiles])
+    ]
     for quality in QUALITIES:
         for mode, calls in EMBREE_MODES.items():
             # A packet is traced as soon as it is made, whatever the tile.
@@ -85,14 +90,5 @@ def inexact_contender(
     tree: Any, view: Any, trace: dict[str, Any], tiles: Sequence[int]
 ) -> RayContender:
     """MLRT with a core that trusts single precision; tree and view are of its module."""
-
-    def variant(tile: int) -> Variant:
-        return Variant(
-            "group",
-            tile,
-            lambda _, image, **keywords: tree.render(
-                view, trace, image, tile=tile, **keywords
-            ),
-        )
-
-    return RayContender(MLRT, INEXACT, [variant(tile) for tile in tiles])
+    variants = [mlrt_variant(tree, trace, tile, view) for tile in tiles]
+    return RayContender(MLRT, INEXACT, variants)
