@@ -40,7 +40,7 @@ def scene_report(
     refusal = refusal_of(summary)
     if refusal:
         lines.append(f"needs --force-direct: {refusal}")
-    warnings = integrator_warnings(summary.features, summary.lighting, native)
+    warnings = integrator_warnings(summary.features, summary.lighting)
     if native and not other and not refusal:
         arrays = import_scene(scene, sensor=sensor, defines=defines)
         film = arrays.film

@@ -142,7 +142,7 @@ def import_scene(
     obstacle = integrators.native_obstacle(found, lighting)
     if obstacle:
         raise UnsupportedFeature(obstacle)
-    warnings = integrators.integrator_warnings(found, lighting, native=True)
+    warnings = integrators.integrator_warnings(found, lighting)
     if not is_loaded_scene(scene):
         check_transforms(parsed)
         check_files(parsed)
@@ -325,7 +325,11 @@ def collect(
     rows = [materials.add(Surface(*surface), names) for surface in surfaces]
     textured = materials.uses_coordinates()
     coordinates = gather_coordinates(
-        shapes, shape_names, [textured[row] for row in rows], geometry.first_vertices
+        shapes,
+        shape_names,
+        [textured[row] for row in rows],
+        geometry.first_vertices,
+        integrators.bsdf_samples_count(found, lighting),
     )
     others = scene_objects.gather_objects(
         by_way,
@@ -388,6 +392,7 @@ def collect(
         not_finite_faces=tuple(geometry.dropped),
         textures=tuple(materials.textures.textures),
         material_textures=materials.texture_array(),
+        material_passes=materials.passes(),
         uvs=coordinates.uvs,
         sampler=sampler,
         environment=emitters.environment_of(sources, name_of),

@@ -8,17 +8,11 @@
 #include "base/simd.h"
 #include "geometry/analytic_shape.h"
 #include "render/shadow_offset.h"
+#include "render/unit_disk.h"
 
 #include <numbers>
 
 namespace mlrt {
-
-inline float sine(float a) {
-    return first_lane(sine(FloatPacket(a)));
-}
-inline float cosine(float a) {
-    return first_lane(cosine(FloatPacket(a)));
-}
 
 // The normal is the one that the shape has without flip_normals. Of a sphere, the density
 // is by solid angle; of others it is to be made from their area.
@@ -109,19 +103,11 @@ AnalyticSample<Real> sample_sphere(const AnalyticShape &sphere, bool flipped,
     return sample;
 }
 
-// Uniform over its area (Shirley and Chiu's concentric map).
+// Uniform over its area.
 template <typename Real>
 AnalyticSample<Real> sample_disk(const AnalyticShape &disk, Vec3f normal, const Real &x,
                                  const Real &y) {
-    constexpr float PI = std::numbers::pi_v<float>;
-    const Real a = fused(Real(2.0f), x, Real(-1.0f));
-    const Real b = fused(Real(2.0f), y, Real(-1.0f));
-    const MaskOf<Real> upright = absolute(a) < absolute(b);
-    const Real r = select(upright, b, a), other = select(upright, a, b);
-    Real phi = Real(0.25f * PI) * other / r;
-    phi = select(upright, Real(0.5f * PI) - phi, phi);
-    phi = select(r == Real(0.0f), Real(0.0f), phi);
-    const Real u = r * cosine(phi), v = r * sine(phi);
+    const auto [u, v] = on_disk(x, y);
     AnalyticSample<Real> sample;
     const Vec3f origin(disk.frame.origin), x_axis(disk.frame.axes[0]),
         y_axis(disk.frame.axes[1]);
