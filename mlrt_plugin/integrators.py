@@ -195,7 +195,7 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
                 f"{name} has {what} = {count}, and at most {MOST_SAMPLES} are taken "
                 "natively: raise the samples per pixel instead"
             )
-    if bsdf_samples_count(features, lighting):
+    if takes_bsdf_samples(features, lighting):
         specular = [f for f in features if f.kind == "bsdf" and f.plugin in SPECULAR]
         if specular:
             return (
@@ -205,7 +205,7 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
     return ""
 
 
-def bsdf_samples_count(features: tuple[Feature, ...], lighting: Lighting) -> bool:
+def takes_bsdf_samples(features: tuple[Feature, ...], lighting: Lighting) -> bool:
     """Whether BSDF samples are asked for and could find a light."""
     return (
         lighting.bsdf_samples > 0
@@ -214,9 +214,7 @@ def bsdf_samples_count(features: tuple[Feature, ...], lighting: Lighting) -> boo
     )
 
 
-def integrator_warnings(
-    features: tuple[Feature, ...], lighting: Lighting
-) -> list[str]:
+def integrator_warnings(features: tuple[Feature, ...], lighting: Lighting) -> list[str]:
     """What of the integrator's work is missing, or not what one would expect, a sentence
     each."""
     name = named(features, lighting)

@@ -323,13 +323,10 @@ def collect(
         shapes, shape_names, geometry.first_faces, geometry.first_vertices, strict=True
     )
     rows = [materials.add(Surface(*surface), names) for surface in surfaces]
-    textured = materials.uses_coordinates()
+    needed = [materials.uses_coordinates()[row] for row in rows]
+    framed = integrators.takes_bsdf_samples(found, lighting)
     coordinates = gather_coordinates(
-        shapes,
-        shape_names,
-        [textured[row] for row in rows],
-        geometry.first_vertices,
-        integrators.bsdf_samples_count(found, lighting),
+        shapes, shape_names, needed, geometry.first_vertices, framed
     )
     others = scene_objects.gather_objects(
         by_way,
@@ -339,6 +336,7 @@ def collect(
         # Their textures and masks are refused, so that no numbers in the tree count.
         lambda shape: materials.add(Surface(shape, name_of(shape), 0, 0), names),
         geometry.warnings,
+        framed,
     )
     shape_of_emitter, emitter_of_shape = scene_objects.lights_of_shapes(
         by_way, others, sources

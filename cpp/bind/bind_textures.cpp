@@ -147,9 +147,12 @@ void check_textures(const SceneData &scene) {
         const std::string name = numbered("shapes", i);
         const Material material =
             shape.material == NONE ? Material{} : scene.materials[shape.material];
+        if (is_object(scene, shape)) {
+            if (material.is_textured())
+                refuse_value(name + " has textures, but its faces are not in the tree.");
+            continue;
+        }
         const bool textured = material.is_textured() || shape.texture_coordinates;
-        if (textured && is_object(scene, shape))
-            refuse_value(name + " has textures, but its faces are not in the tree.");
         if (textured && scene.faces.empty())
             refuse_value(name + " has textures, but faces are empty.");
         for (uint32_t k = 0; k < shape.face_count && shape.texture_coordinates; ++k)

@@ -39,14 +39,19 @@ Vec3f triangle_tangent(const Triangle &triangle, const std::array<Vec2f, 3> *uvs
     return tangent;
 }
 
-Vec3f mesh_tangent(const PreparedScene &scene, uint32_t face) {
-    const Triangle &triangle = scene.data.tree->triangles[face];
-    if (!shape_of(scene, face).texture_coordinates)
-        return triangle_tangent(triangle, nullptr);
-    const auto &[a, b, c] = scene.data.faces[face];
-    const std::vector<Vec2f> &uvs = scene.data.uvs;
-    const std::array<Vec2f, 3> of_vertices{uvs[a], uvs[b], uvs[c]};
+Vec3f face_tangent(const Triangle &triangle, const std::array<uint32_t, 3> &vertices,
+                   const std::vector<Vec2f> &uvs) {
+    const std::array<Vec2f, 3> of_vertices{uvs[vertices[0]], uvs[vertices[1]],
+                                           uvs[vertices[2]]};
     return triangle_tangent(triangle, &of_vertices);
+}
+
+Vec3f mesh_tangent(const PreparedScene &scene, uint32_t face) {
+    const SceneData &data = scene.data;
+    const Triangle &triangle = data.tree->triangles[face];
+    return shape_of(scene, face).texture_coordinates
+               ? face_tangent(triangle, data.faces[face], data.uvs)
+               : triangle_tangent(triangle, nullptr);
 }
 
 // Mitsuba's sphere.cpp, disk.cpp and cylinder.cpp. The length does not matter, but 0 does.
@@ -73,8 +78,12 @@ Vec3f object_tangent(const PreparedScene &scene, const ObjectHit &hit) {
         return Vec3f(instance.to_world.vector(analytic(origin, direction)));
     }
     const ObjectGroup &group = objects.groups[instance.group];
-    const Triangle &triangle = group.tree->triangles[hit.face - group.first_face];
-    return Vec3f(instance.to_world.vector(Vec3d(triangle_tangent(triangle, nullptr))));
+    const uint32_t number = hit.face - group.first_face;
+    const Triangle &triangle = group.tree->triangles[number];
+    const Vec3f tangent = shape_of(scene, hit.face).texture_coordinates
+                              ? face_tangent(triangle, group.faces[number], group.uvs)
+                              : triangle_tangent(triangle, nullptr);
+    return Vec3f(instance.to_world.vector(Vec3d(tangent)));
 }
 
 } // namespace
