@@ -16,13 +16,12 @@ namespace mlrt {
 namespace {
 
 UIntPacket shapes_of(const PreparedScene &scene, const UIntPacket &faces, LaneBits lanes) {
-    LaneArray<uint32_t> shapes;
-    shapes.fill(NONE);
+    UIntPacket shapes(NONE);
     for_each_value(faces, lanes, [&](uint32_t face, LaneBits holders) {
-        const uint32_t shape = scene.shape_of_face[face];
-        for_each_lane(holders, [&](uint32_t lane) { shapes[lane] = shape; });
+        shapes = select(from_bits<UIntPacket>(holders),
+                        UIntPacket(scene.shape_of_face[face]), shapes);
     });
-    return load<UIntPacket>(shapes);
+    return shapes;
 }
 
 // What the sides that the rays see reflect; black in other lanes.
