@@ -62,8 +62,8 @@ private:
                                   : std::numeric_limits<uint32_t>::max();
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
-        const bool done = trace_beam_leaf<Output::query>(
-            tree_, rays_, frontier, memory_, most, beam, counters_);
+        const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
+                                                         most, beam, counters_);
         const float spent = float(counters_.beam_triangles - before) / float(active);
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
