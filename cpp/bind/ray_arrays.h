@@ -5,7 +5,6 @@
 #include "base/parallel.h"
 #include "bind/mesh_arrays.h"
 #include "bind/watch.h"
-#include "mlrta/trace_unordered.h"
 #include "traverse/ray_group.h"
 
 #include <algorithm>
