@@ -1,5 +1,6 @@
 #include "render/bsdf_rays.h"
 
+#include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
 #include "render/emitter_density.h"
 #include "render/hit_packet.h"
@@ -9,20 +10,6 @@
 #include <limits>
 
 namespace mlrt {
-
-namespace {
-
-// Rays that are sorted by direction make packets worth while, but go everywhere from all
-// over the tile, so that entry points hardly save a step.
-TraceOptions for_sorted_rays(TraceOptions options) {
-    if (options.traversal != Traversal::adaptive)
-        return options;
-    options.traversal = Traversal::packet;
-    options.entry_points = false;
-    return options;
-}
-
-} // namespace
 
 SampleShares::SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples) {
     const float sum = float(emitter_samples + bsdf_samples);
@@ -43,13 +30,11 @@ void BsdfRays::reserve(size_t size) {
     density_.resize(size);
     t_min_.resize(size, 0.0f);
     t_max_.resize(size, std::numeric_limits<float>::max());
-    for (Hits *hits : {&found_, &hits_}) {
-        hits->primitive.resize(size);
-        hits->blocked.resize(size);
-        if (scene_.data.objects) {
-            hits->instance.resize(size);
-            hits->t.resize(size);
-        }
+    primitive_.resize(size);
+    blocked_.resize(size);
+    if (scene_.data.objects) {
+        instance_.resize(size, NO_INSTANCE);
+        t_.resize(size);
     }
 }
 
@@ -67,8 +52,7 @@ void BsdfRays::append(const BsdfSamples &samples, const UIntPacket &ray,
     count_ += uint32_t(std::popcount(samples.lanes));
 }
 
-void BsdfRays::find_hits(const TraceOptions &given, Counters &counters, float *cost) {
-    const TraceOptions options = for_sorted_rays(given);
+void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float *cost) {
     RayGroup rays;
     rays.count = count_;
     for (int k = 0; k < 3; ++k) {
@@ -77,36 +61,29 @@ void BsdfRays::find_hits(const TraceOptions &given, Counters &counters, float *c
     }
     rays.t_min = t_min_.data();
     rays.t_max = t_max_.data();
-    order_.sort(rays);
-    RayGroup sorted = order_.group();
     if (cost) {
         cost_.assign(count_, 0.0f);
-        sorted.cost = cost_.data();
+        rays.cost = cost_.data();
     }
+    // Rays that are sorted have no costs.
+    const auto any = cost ? trace_any : trace_any_unordered;
     const SceneData &scene = scene_.data;
     if (!scene_.any_shape_glows) {
-        trace_any(*scene.tree, sorted, options, found_.blocked.data(), counters);
+        any(*scene.tree, rays, options, blocked_.data(), counters);
         if (scene.objects)
-            trace_any_objects(*scene.objects, sorted, found_.blocked.data(), counters);
-        order_.put_back(found_.blocked, hits_.blocked.data());
+            trace_any_objects(*scene.objects, rays, blocked_.data(), counters);
     } else {
-        float *t = scene.objects ? found_.t.data() : nullptr;
-        trace_closest(*scene.tree, sorted, options, {t, found_.primitive.data()}, counters);
-        if (scene.objects) {
-            trace_closest_objects(*scene.objects, sorted,
-                                  {t, found_.primitive.data(), found_.instance.data()},
-                                  counters);
-            order_.put_back(found_.t, hits_.t.data());
-            order_.put_back(found_.instance, hits_.instance.data());
-        }
-        order_.put_back(found_.primitive, hits_.primitive.data());
+        const HitGroup hits{scene.objects ? t_.data() : nullptr, primitive_.data()};
+        if (cost)
+            trace_closest(*scene.tree, rays, options, hits, counters);
+        else
+            trace_closest_unordered(*scene.tree, rays, options, hits, counters);
+        if (scene.objects)
+            trace_closest_objects(*scene.objects, rays,
+                                  {hits.t, hits.primitive, instance_.data()}, counters);
     }
-    if (!cost)
-        return;
-    std::vector<float> by_ray(count_);
-    order_.put_back(cost_, by_ray.data());
-    for (uint32_t i = 0; i < count_; ++i)
-        cost[ray_[i]] += by_ray[i];
+    for (uint32_t i = 0; cost && i < count_; ++i)
+        cost[ray_[i]] += cost_[i];
 }
 
 Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t first) const {
@@ -121,7 +98,7 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
     emitters.fill(NONE);
     HitPacket hit;
     for_each_lane(hits, [&](uint32_t lane) {
-        const uint32_t shape = scene_.shape_of_face[hits_.primitive[first + lane]];
+        const uint32_t shape = scene_.shape_of_face[primitive_[first + lane]];
         emitters[lane] = scene_.data.shapes[shape].emitter;
         hit.lanes |= LaneBits(emitters[lane] != NONE) << lane;
     });
@@ -129,10 +106,10 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
         return light;
     hit.origin = vector(start_, first);
     hit.direction = vector(direction_, first);
-    hit.faces = load<UIntPacket>(&hits_.primitive[first]);
+    hit.faces = load<UIntPacket>(&primitive_[first]);
     if (scene_.data.objects) {
-        hit.t = load<FloatPacket>(&hits_.t[first]);
-        hit.instances = load<UIntPacket>(&hits_.instance[first]);
+        hit.t = load<FloatPacket>(&t_[first]);
+        hit.instances = load<UIntPacket>(&instance_[first]);
     }
     const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
     const Vec3<FloatPacket> from = vector(p_, first);
@@ -181,8 +158,8 @@ void BsdfRays::trace(const TraceOptions &options, Counters &counters, float *cos
         LaneBits misses = 0;
         for_each_lane(lanes, [&](uint32_t lane) {
             const bool miss = scene_.any_shape_glows
-                                  ? hits_.primitive[first + lane] == NO_PRIMITIVE
-                                  : hits_.blocked[first + lane] == 0;
+                                  ? primitive_[first + lane] == NO_PRIMITIVE
+                                  : blocked_[first + lane] == 0;
             misses |= LaneBits(miss) << lane;
         });
         Vec3<FloatPacket> light = in_all_lanes({});

@@ -100,9 +100,7 @@ def test_stored_reference_of_mitsubas_tests_goes_before(
 def test_reference_by_the_authored_integrator(tmp_path: Path) -> None:
     """Where both find the same light, which the sampling of a path does."""
     scene = tmp_path / "scene.xml"
-    authored = (
-        '<integrator type="path"><integer name="max_depth" value="2"/></integrator>'
-    )
+    authored = '<integrator type="path"><integer name="max_depth" value="2"/></integrator>'
     text, count = re.subn(
         "<integrator.*</integrator>", authored, SCENE.read_text(), flags=re.DOTALL
     )
