@@ -50,12 +50,13 @@ def study(
     """Figures of a mesh: a row for each aim."""
     show_status(f"{mesh.name}: preparing")
     start = time.perf_counter()
-    points = watertight.points_of(mesh, seed)
+    field = watertight.range_of(mesh, seed)
+    mesh = field.mesh
     contenders = hit_contenders(native, mesh.vertices, mesh.faces, threads)
     rows = []
     for number, aim in enumerate(AIMS):
         show_status(f"{mesh.name}: {aim.name}")
-        leaks = watertight.trace(mesh, contenders, aim, count, seed + number, points)
+        leaks = watertight.trace(field, contenders, aim, count, seed + number)
         rows.append({"aim": aim.name, "rays": count, "leaks": leaks_as_json(leaks)})
     show_status("")
     return {
@@ -67,7 +68,7 @@ def study(
 
 def leaks_as_json(leaks: dict[str, Leaks]) -> dict[str, Any]:
     return {
-        name: {"count": found.count, "examples": found.examples}
+        name: {"rays": found.rays, "count": found.count, "examples": found.examples}
         for name, found in leaks.items()
     }
 
@@ -77,8 +78,13 @@ def lines(scene: dict[str, Any]) -> list[str]:
     names = list(scene["rows"][0]["leaks"])
     table = [("", "rays", *names)]
     for row in scene["rows"]:
-        counts = (f"{row['leaks'][name]['count']:,}" for name in names)
-        table.append((row["aim"], f"{row['rays']:,}", *counts))
+        found = (row["leaks"][name] for name in names)
+        leaks = (
+            f"{each['count']:,}"
+            + ("" if each["rays"] == row["rays"] else f" of {each['rays']:,}")
+            for each in found
+        )
+        table.append((row["aim"], f"{row['rays']:,}", *leaks))
     head = f"{scene['name']}, {scene['triangles']:,} triangles, leaks:"
     return [head, *aligned(table)]
 
@@ -86,14 +92,20 @@ def lines(scene: dict[str, Any]) -> list[str]:
 def total(scenes: list[dict[str, Any]]) -> dict[str, Any]:
     rows = [row for scene in scenes for row in scene["rows"]]
     names = list(rows[0]["leaks"])
+
+    def sums(key: str) -> dict[str, int]:
+        return {name: sum(row["leaks"][name][key] for row in rows) for name in names}
+
     return {
         "rays": sum(row["rays"] for row in rows),
-        "leaks": {name: sum(row["leaks"][name]["count"] for row in rows) for name in names},
+        "traced": sums("rays"),
+        "leaks": sums("count"),
     }
 
 
 def total_lines(found: dict[str, Any]) -> list[str]:
-    return [
-        f"{name}: {count:,} of {found['rays']:,} rays escape, {count / found['rays']:.3g}"
-        for name, count in found["leaks"].items()
-    ]
+    lines = []
+    for name, count in found["leaks"].items():
+        rays = found["traced"][name]
+        lines.append(f"{name}: {count:,} of {rays:,} rays escape, {count / rays:.3g}")
+    return lines
