@@ -133,9 +133,7 @@ class InnerBalls:
     centers: FloatArray
     radii: FloatArray
 
-    def points(
-        self, rng: np.random.Generator, chosen: npt.NDArray[np.int64]
-    ) -> FloatArray:
+    def points(self, rng: np.random.Generator, chosen: npt.NDArray[np.int64]) -> FloatArray:
         """One (N, 3) in each of the chosen balls (N,)."""
         # In the cube that the ball is around.
         reach = self.radii[chosen, None] / np.float32(np.sqrt(3))

@@ -133,10 +133,14 @@ def markdown(figures: dict[str, Any]) -> str:
     page = [
         "# Tests of triangles and ways through the tree",
         "",
-        "By `mlrt-bench kernels`: leaks are rays that find nothing, wrong hits such of "
-        "what lies behind, other hits those of another face than the exact one, most of "
-        "which tie; then distances that are not the nearest float, and by how many units "
-        "in the last place.",
+        "By `mlrt-bench kernels`: leaks are rays that find nothing; other hits those of "
+        "another face than the exact one, most of which tie; wrong hits such of a face "
+        "that exact arithmetic does not have among the nearest; wrong of 10^9 are leaks "
+        "and wrong hits; then distances that are not the nearest float, and by how many "
+        "units in the last place.",
+        "",
+        *summary_lines(figures),
+        "",
         "",
         *machine_lines(figures["machine"]),
     ]

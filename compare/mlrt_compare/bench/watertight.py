@@ -25,7 +25,7 @@ SHARING = 4096
 """Rays in a row that start at the same point, where some do: as many as MLRT traces in one
 group."""
 NEIGHBOURS = 2 * SHARING
-"""Faces along a curve through space, at which rays of one origin are aimed: so many that few
+"""Faces along a curve through space that rays of one origin are aimed at: so many that few
 rays are the same, so few that beams are narrow."""
 OTHERS = 16
 """Those who are only there to compare with MLRT trace one batch in so many."""
@@ -103,9 +103,7 @@ def chosen_faces(
     return faces[(first + within).reshape(-1)[:count]]
 
 
-def targets(
-    mesh: ClosedMesh, rng: np.random.Generator, aim: Aim, count: int
-) -> FloatArray:
+def targets(mesh: ClosedMesh, rng: np.random.Generator, aim: Aim, count: int) -> FloatArray:
     """Points (N, 3) of the mesh, rounded where they are not vertices."""
     face = chosen_faces(mesh.faces, rng, aim, count)
     corner = rng.integers(0, 3, count)
