@@ -198,8 +198,9 @@ def compare(
         same = (face == exact_face) & (face >= 0)
         other = np.flatnonzero((face != exact_face) & (face >= 0))
         leaks = int((face < 0).sum())
-        of_others = (array[other] for array in (origins, directions, face, exact_t))
-        wrong = int(np.count_nonzero(~ties(mesh, *of_others)))
+        rays_of_others = origins[other], directions[other]
+        tied = ties(mesh, *rays_of_others, face[other], exact_t[other])
+        wrong = int(np.count_nonzero(~tied))
         # Positive floats are in the order of their bits.
         ulps = np.abs(
             t[same].view(np.int32).astype(np.int64) - exact_t[same].view(np.int32)
@@ -230,4 +231,5 @@ def ties(
 ) -> npt.NDArray[np.bool_]:
     """Which rays meet the face as near as the nearest one is, by whole numbers."""
     t = exact_distances(origins, directions, mesh.vertices[mesh.faces[face]])
-    return t == exact_t
+    tied: npt.NDArray[np.bool_] = t == exact_t
+    return tied

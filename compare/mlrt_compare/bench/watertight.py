@@ -95,12 +95,14 @@ def chosen_faces(
 ) -> FaceArray:
     """At random (count, 3): from anywhere, or for each run from neighbours, in order."""
     if not aim.share_origin:
-        return faces[rng.integers(0, len(faces), count)]
+        anywhere: FaceArray = faces[rng.integers(0, len(faces), count)]
+        return anywhere
     runs = -(-count // SHARING)
     window = min(NEIGHBOURS, len(faces))
     first = rng.integers(0, len(faces) - window + 1, (runs, 1))
     within = np.sort(rng.integers(0, window, (runs, SHARING), np.uint16), axis=1)
-    return faces[(first + within).reshape(-1)[:count]]
+    chosen: FaceArray = faces[(first + within).reshape(-1)[:count]]
+    return chosen
 
 
 def targets(mesh: ClosedMesh, rng: np.random.Generator, aim: Aim, count: int) -> FloatArray:
