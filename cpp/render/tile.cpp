@@ -21,13 +21,12 @@ LaneBits not_black(const Vec3<FloatPacket> &colour) {
 }
 
 UIntPacket shapes_of(const PreparedScene &scene, const UIntPacket &faces, LaneBits lanes) {
-    LaneArray<uint32_t> shapes;
-    shapes.fill(NONE);
+    UIntPacket shapes(NONE);
     for_each_value(faces, lanes, [&](uint32_t face, LaneBits holders) {
-        const uint32_t shape = scene.shape_of_face[face];
-        for_each_lane(holders, [&](uint32_t lane) { shapes[lane] = shape; });
+        shapes = select(from_bits<UIntPacket>(holders),
+                        UIntPacket(scene.shape_of_face[face]), shapes);
     });
-    return load<UIntPacket>(shapes);
+    return shapes;
 }
 
 // What the sides that the rays see reflect; black in other lanes.
@@ -232,14 +231,12 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
         lit &= not_black(light.weight) & to_bits(cos_light > zero);
         if (lit == 0)
             return;
-        ShadowSegment<FloatPacket> segment;
-        if (offset_ == ShadowOffset::robust) {
-            segment =
-                robust_segment<FloatPacket>(scene_, plane_of(scene_, hit), emitter, light);
-        } else {
-            segment = {offset_point(point.p, point.face_normal, light.target - point.p),
-                       light.target};
-        }
+        const ShadowSegment<FloatPacket> segment =
+            offset_ == ShadowOffset::robust
+                ? robust_segment<FloatPacket>(scene_, plane_of(scene_, hit), emitter, light)
+                : ShadowSegment<FloatPacket>{
+                      offset_point(point.p, point.face_normal, light.target - point.p),
+                      light.target};
         const FloatPacket share = FloatPacket(part) * cos_light;
         shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
                                  (albedo * share) * light.weight);
