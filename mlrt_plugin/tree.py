@@ -17,6 +17,9 @@ from .options import BUILD_OPTIONS, TRACE_OPTIONS
 from .tree_files import load_tree, save_tree
 from .tree_report import tree_report
 
+MAX_FACES = 2**30
+"""Of a kd-tree, as in ``cpp/kdtree/events.h``."""
+
 
 class Hits(NamedTuple):
     """Nearest hits of N rays.
@@ -208,6 +211,10 @@ def indices(values: Any, vertex_count: int) -> npt.NDArray[np.uint32]:
         raise ValueError(f"faces must have the shape (F, 3), not {array.shape}")
     if array.dtype.kind not in "iu":
         raise ValueError(f"faces must hold integers, not {array.dtype}")
+    if len(array) > MAX_FACES:
+        raise ValueError(
+            f"there are {len(array)} faces, more than a kd-tree can hold (2^30)"
+        )
     if array.size:
         low, high = int(array.min()), int(array.max())
         if low < 0 or high >= vertex_count:

@@ -21,6 +21,7 @@ from mlrt_compare.bench.closed_meshes import (
     sphere,
     winding_number,
 )
+from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.hit_contenders import (
     FloatArray,
     HitArrays,
@@ -28,6 +29,7 @@ from mlrt_compare.bench.hit_contenders import (
     hit_contenders,
 )
 from mlrt_compare.bench.native import Native
+from mlrt_compare.bench.watertight_command import meshes_to_keep
 
 from mlrt_plugin import KdTree
 
@@ -233,6 +235,32 @@ def test_watertight_command(native: Native, cache: Path, tmp_path: Path) -> None
     assert figures["total"]["leaks"]["MLRT"] == 0
     assert figures["total"]["traced"] == dict.fromkeys(NAMES, 360_000)
     assert "MLRT: 0 of 360,000 rays escape" in child.stdout
+
+
+def test_an_ended_run_is_continued(tmp_path: Path) -> None:
+    """Meshes that it finished are kept; a run of other rays is not continued."""
+    path = tmp_path / "figures.json"
+    figures = {
+        "benchmark": "watertight",
+        "settings": {"rays": 6, "seed": 1, "threads": 2, "meshes": ["a", "b", "c"]},
+        "machine": {"commit": "abc"},
+        "scenes": [
+            {"name": "a", "skipped": None, "rows": [1]},
+            {"name": "b", "skipped": "there is no b"},
+            {"name": "c", "skipped": None},
+        ],
+    }
+    assert meshes_to_keep(path, figures) == []
+    path.write_text(json.dumps(figures))
+    assert meshes_to_keep(path, figures) == figures["scenes"][:1]
+    other = figures | {"settings": {"rays": 7, "seed": 1, "meshes": ["a", "b", "c"]}}
+    with pytest.raises(BenchError, match="another benchmark, number of rays"):
+        meshes_to_keep(path, other)
+    path.write_text("[]")
+    with pytest.raises(BenchError, match="does not hold figures"):
+        meshes_to_keep(path, figures)
+    with pytest.raises(BenchError, match="--continue needs --json"):
+        meshes_to_keep(None, figures)
 
 
 def test_hits_command(native: Native, cache: Path, tmp_path: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from pathlib import Path
 from typing import Any
 
 from mlrt_plugin.threads import thread_count
@@ -11,6 +13,7 @@ from mlrt_plugin.threads import thread_count
 from . import watertight
 from .checkout import find_checkout
 from .closed_meshes import ClosedMesh, chosen_meshes, usual_meshes
+from .errors import BenchError
 from .figures import measure_scenes, new_figures, show, write_json
 from .hit_contenders import hit_contenders
 from .machine import machine_record
@@ -20,6 +23,9 @@ from .status import show_status
 from .table import aligned
 from .watertight import AIMS, Leaks
 
+KEPT_SETTINGS = ("rays", "seed", "meshes")
+"""What must be the same where a run is continued."""
+
 
 def run(options: argparse.Namespace) -> bool:
     """Returns whether no ray escaped MLRT."""
@@ -28,6 +34,10 @@ def run(options: argparse.Namespace) -> bool:
     native = load_native(source, options.cache or default_cache())
     settings = {"rays": options.rays, "seed": options.seed, "threads": options.threads}
     figures = new_figures("watertight", machine_record(source, native), settings)
+    settings["meshes"] = [mesh.name for mesh in meshes]
+    if options.resume:
+        figures["scenes"] = meshes_to_keep(options.json, figures)
+    kept = {scene["name"] for scene in figures["scenes"]}
     share = max(1, options.rays // (len(meshes) * len(AIMS)))
 
     def measure(mesh: ClosedMesh, scene: dict[str, Any]) -> None:
@@ -35,13 +45,43 @@ def run(options: argparse.Namespace) -> bool:
             scene |= study(native, mesh, share, options.seed, options.threads)
         show(["", *lines(scene)])
 
-    measured = measure_scenes(
-        figures, meshes, lambda mesh: mesh.load(), measure, options.json
-    )
-    figures["total"] = total(measured)
+    left = [mesh for mesh in meshes if mesh.name not in kept]
+    if left:
+        measure_scenes(figures, left, lambda mesh: mesh.load(), measure, options.json)
+    figures["total"] = total(finished(figures))
     show(["", *total_lines(figures["total"])])
     write_json(options.json, figures)
     return bool(figures["total"]["leaks"]["MLRT"] == 0)
+
+
+def finished(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Meshes that were traced to the end."""
+    return [scene for scene in figures["scenes"] if "rows" in scene]
+
+
+def meshes_to_keep(path: Path | None, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those that an ended run has finished, if there is its file.
+
+    Raises BenchError if the file cannot be read, or if the run had another number of rays,
+    seed, choice of meshes, or commit, as then its figures do not belong to those to come.
+    """
+    if path is None:
+        raise BenchError("--continue needs --json, the file of the run that was ended")
+    if not path.is_file():
+        return []
+    try:
+        earlier = json.loads(path.read_text())
+        belongs = earlier["benchmark"] == figures["benchmark"]
+        for part, key in (*(("settings", k) for k in KEPT_SETTINGS), ("machine", "commit")):
+            belongs &= earlier[part].get(key) == figures[part][key]
+        if belongs:
+            return finished(earlier)
+    except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        raise BenchError(f"{path} does not hold figures of `watertight`") from error
+    raise BenchError(
+        f"{path} is of another benchmark, number of rays, seed, choice of meshes or "
+        "commit: name another file"
+    )
 
 
 def study(
