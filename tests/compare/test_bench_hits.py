@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,15 +11,7 @@ import workloads
 from bench_command import assert_one_sentence, command
 from mlrt_compare.bench import watertight, wrong_hits
 from mlrt_compare.bench.adversarial import RAYS, SCENES, SmallScene
-from mlrt_compare.bench.closed_meshes import (
-    ClosedMesh,
-    distances,
-    inner_balls,
-    slivers,
-    solid_angles,
-    sphere,
-    winding_number,
-)
+from mlrt_compare.bench.closed_meshes import sphere
 from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.hit_contenders import (
     FloatArray,
@@ -135,41 +126,6 @@ def test_rays_of_one_origin_are_neighbours() -> None:
         turns[share_origin] = np.median(np.linalg.norm(d[1:] - d[:-1], axis=1))
         assert (np.linalg.norm(d.mean(axis=0)) > 0.5) == share_origin
     assert 20 * turns[True] < turns[False]
-
-
-@pytest.mark.parametrize("far", [False, True], ids=["at the origin", "far"])
-@pytest.mark.parametrize("make", [sphere, slivers], ids=["sphere", "slivers"])
-def test_meshes_surround_all_of_an_inner_ball(
-    make: Callable[[], ClosedMesh], far: bool
-) -> None:
-    """By the winding numbers of points of balls, and by distances in exact arithmetic's
-    place: those of many points of the faces."""
-    mesh = make().moved_far() if far else make()
-    rng = np.random.default_rng(SEED)
-    balls = inner_balls(mesh, rng, 20)
-    assert (balls.radii > 0).mean() > 0.9
-    for point in balls.points(rng, np.arange(20)):
-        assert abs(winding_number(solid_angles(mesh, point))) == pytest.approx(1)
-    corners = mesh.vertices[rng.permutation(mesh.faces)[:2000]].astype(np.float64)
-    weights = rng.dirichlet((1, 1, 1), 50)
-    points = np.einsum("kj,njx->nkx", weights, corners).reshape(-1, 3)
-    for center, radius in zip(balls.centers, balls.radii, strict=True):
-        assert np.linalg.norm(points - center, axis=1).min() > radius
-
-
-def test_distances_of_triangles_are_those_of_their_points() -> None:
-    rng = np.random.default_rng(SEED)
-    corners = rng.normal(size=(200, 3, 3)) + rng.normal(size=(200, 1, 3))
-    corners[::10, 2] = corners[::10, 1]
-    steps = np.linspace(0, 1, 61)
-    u, v = (axis.ravel() for axis in np.meshgrid(steps, steps))
-    within = u + v <= 1
-    weights = np.stack([1 - u - v, u, v], axis=1)[within]
-    points = np.einsum("kj,njx->nkx", weights, corners)
-    sampled = np.linalg.norm(points, axis=2).min(axis=1)
-    found = distances(corners)
-    assert (found <= sampled + 1e-12).all()
-    np.testing.assert_allclose(found, sampled, atol=0.05)
 
 
 def test_wrong_hits_are_counted() -> None:
