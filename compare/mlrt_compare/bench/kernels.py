@@ -18,6 +18,7 @@ from .exact_hits import exact_distances
 from .hit_contenders import HitContender, embree_contenders
 from .native import Native
 from .offset_scene import ball
+from .wrong_hits import FAR_OFF
 
 FloatArray = npt.NDArray[np.float32]
 HitArrays = tuple[FloatArray, npt.NDArray[np.int64]]
@@ -177,9 +178,10 @@ def compare(
     repeats: int,
 ) -> list[dict[str, Any]]:
     """Leaks, which are rays that find nothing; hits of other faces than the exact one's, of
-    which most tie with it; wrong ones of these; leaks and wrong hits of a billion rays;
-    errors of t in units in the last place where the face is the same; and rays a second,
-    the best of some runs in turns.
+    which most tie with it; wrong ones of these, and those of them that are far off, which
+    are no neighbours; leaks and wrong hits of a billion rays; errors of t in units in the
+    last place where the face is the same; and rays a second, the best of some runs in
+    turns.
 
     The face alone tells a wrong hit: exact arithmetic must have it among the nearest. The
     distance that comes with it is judged in units in the last place. It could not tell a
@@ -200,7 +202,8 @@ def compare(
         leaks = int((face < 0).sum())
         rays_of_others = origins[other], directions[other]
         tied = ties(mesh, *rays_of_others, face[other], exact_t[other])
-        wrong = int(np.count_nonzero(~tied))
+        wrong = other[~tied]
+        off = np.abs(t[wrong] - exact_t[wrong].astype(np.float64))
         # Positive floats are in the order of their bits.
         ulps = np.abs(
             t[same].view(np.int32).astype(np.int64) - exact_t[same].view(np.int32)
@@ -211,8 +214,9 @@ def compare(
                 "rays": len(t),
                 "leaks": leaks,
                 "other_hits": int((face != exact_face).sum()),
-                "wrong_hits": wrong,
-                "wrong_per_billion": (leaks + wrong) / len(t) * 1e9,
+                "wrong_hits": len(wrong),
+                "far_off": int(np.count_nonzero(~(off <= FAR_OFF * exact_t[wrong]))),
+                "wrong_per_billion": (leaks + len(wrong)) / len(t) * 1e9,
                 "inexact_t": int(np.count_nonzero(ulps)),
                 "ulps_p99": float(np.percentile(ulps, 99)) if len(ulps) else 0.0,
                 "ulps_max": int(ulps.max(initial=0)),
