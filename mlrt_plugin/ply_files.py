@@ -58,6 +58,8 @@ def read_header(head: bytes) -> PlyHeader:
                 order = BYTE_ORDERS[name]
             case ["element", name, count]:
                 elements.append(PlyElement(name, int(count)))
+                if not 0 <= elements[-1].count < 2**32:
+                    raise ValueError(f"an element {name} of {count} rows")
             case ["property", "list", count_type, item_type, name]:
                 elements[-1].fields += [
                     (f"{name} count", order + SCALARS[count_type]),
@@ -76,7 +78,9 @@ def triangle_indices(path: Path) -> tuple[npt.NDArray[np.int64], int]:
     """
     with path.open("rb") as file:
         header = read_header(file.read(LONGEST_HEADER))
-    vertex_count = next(e.count for e in header.elements if e.name == "vertex")
+    vertex_count = next((e.count for e in header.elements if e.name == "vertex"), None)
+    if vertex_count is None:
+        raise ValueError("no vertices")
     read_faces = binary_faces if header.byte_order else text_faces
     counts, indices = read_faces(path, header)
     if not (counts == 3).all():
@@ -92,8 +96,9 @@ def binary_faces(path: Path, header: PlyHeader) -> Faces:
     for element in header.elements:
         record = np.dtype(element.fields)
         if element.name == "face":
-            table = np.memmap(path, record, "r", offset, (element.count,))
+            # Before the file is mapped: NumPy dies of records without a field.
             name = index_field(element)
+            table = np.memmap(path, record, "r", offset, (element.count,))
             return table[f"{name} count"].astype(np.int64), table[name].astype(np.int64)
         if any(len(f) == 3 for f in element.fields):
             raise ValueError("a list before the faces")
@@ -140,6 +145,9 @@ def positions(path: Path) -> npt.NDArray[np.float64]:
 
 
 def index_field(face: PlyElement) -> str:
-    """Name of the list of vertex indices, for which two spellings are in use."""
-    names = [f[0] for f in face.fields]
-    return next(n for n in ("vertex_indices", "vertex_index") if n in names)
+    """Name of the list of vertex indices, for which two spellings are in use; raises
+    ValueError if there is none."""
+    for name, *_ in face.fields:
+        if name in ("vertex_indices", "vertex_index"):
+            return name
+    raise ValueError("faces without vertex indices")

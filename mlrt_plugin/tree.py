@@ -17,6 +17,9 @@ from .options import BUILD_OPTIONS, TRACE_OPTIONS
 from .tree_files import load_tree, save_tree
 from .tree_report import tree_report
 
+MAX_FACES = 2**30
+"""Of a kd-tree, as in ``cpp/kdtree/events.h``."""
+
 
 class Hits(NamedTuple):
     """Nearest hits of N rays.
@@ -124,12 +127,14 @@ class KdTree:
 
         origins, directions: (N, 3); directions need not have unit length. Rays that follow
         one another should be near one another in space.
-        t_min, t_max: numbers or (N,).
+        t_min, t_max: numbers or (N,). What lies behind the origin is never hit: a negative
+        t_min counts as 0.
         options: fields of `TraceOptions`, see `mlrt_plugin.options.TRACE_OPTIONS`; they
         change the time that is taken, never the result.
 
-        A ray with a component that is not finite, or with a direction of zero length,
-        misses. Raises ValueError for arrays of another shape or type.
+        A ray with a component that is not finite, with a direction of zero length, or with
+        no t between its bounds, as where t_min exceeds t_max or one is NaN, misses. Raises
+        ValueError for arrays of another shape or type.
         """
         rays = ray_arrays(origins, directions, t_min, t_max)
         t, primitive, u, v = self._tree.closest_hit(*rays, trace_options(options))
@@ -169,9 +174,15 @@ def trace_options(options: dict[str, Any]) -> dict[str, Any]:
     return options
 
 
-def as_numpy(values: Any) -> npt.NDArray[Any]:
+def as_numpy(values: Any, name: str) -> npt.NDArray[Any]:
     """An array of NumPy; nested Dr.Jit arrays such as ``mi.Point3f`` come as (N, 3)."""
-    array = np.asarray(values)
+    if np.ma.is_masked(values):
+        raise ValueError(f"{name} must have no masked values: fill them or leave them out")
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        # NumPy's sentence does not tell which argument has rows of different lengths.
+        raise ValueError(f"{name} must be an array with rows of one length") from None
     if dr.is_array_v(values) and not dr.is_tensor_v(values) and dr.depth_v(values) == 2:
         return array.T
     return array
@@ -187,7 +198,7 @@ def single(array: npt.NDArray[Any], name: str) -> npt.NDArray[np.float32]:
 
 def triples(values: Any, name: str) -> npt.NDArray[np.float32]:
     """Points or vectors as (N, 3) float32."""
-    array = as_numpy(values)
+    array = as_numpy(values, name)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have the shape (N, 3), not {array.shape}")
     return single(array, name)
@@ -195,11 +206,15 @@ def triples(values: Any, name: str) -> npt.NDArray[np.float32]:
 
 def indices(values: Any, vertex_count: int) -> npt.NDArray[np.uint32]:
     """Faces as (F, 3) uint32."""
-    array = as_numpy(values)
+    array = as_numpy(values, "faces")
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"faces must have the shape (F, 3), not {array.shape}")
     if array.dtype.kind not in "iu":
         raise ValueError(f"faces must hold integers, not {array.dtype}")
+    if len(array) > MAX_FACES:
+        raise ValueError(
+            f"there are {len(array)} faces, more than a kd-tree can hold (2^30)"
+        )
     if array.size:
         low, high = int(array.min()), int(array.max())
         if low < 0 or high >= vertex_count:
@@ -222,7 +237,7 @@ def ray_arrays(
         )
     bounds = []
     for values, name in ((t_min, "t_min"), (t_max, "t_max")):
-        array = as_numpy(values)
+        array = as_numpy(values, name)
         if array.shape not in ((), (1,), (len(start),)):
             raise ValueError(
                 f"{name} must be a number or have the shape ({len(start)},), not "

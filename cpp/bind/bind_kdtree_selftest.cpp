@@ -8,6 +8,7 @@
 #include "kdtree/builder.h"
 #include "kdtree/lazy.h"
 #include "kdtree/sah.h"
+#include "kdtree/subtree.h"
 
 #include <cstring>
 #include <memory>
@@ -136,6 +137,8 @@ void bind_kdtree_selftest(nb::module_ &m) {
           nb::arg("position"), nb::arg("lower_count"), nb::arg("upper_count"),
           nb::arg("options"));
     s.def("uncovered_area", &uncovered);
+    s.def("check_tree_size", &check_tree_size, nb::arg("node_count"),
+          nb::arg("reference_count"));
     s.attr("max_tree_depth") = MAX_TREE_DEPTH;
 }
 

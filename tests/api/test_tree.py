@@ -60,7 +60,20 @@ DOWN = ([(0.25, 0.25, 2)], [(0, 0, -1)])
 
 @pytest.mark.parametrize(
     ("t_min", "t_max", "hit"),
-    [(0, np.inf, True), (0, 2, True), (0, 1.99, False), (2, 3, False), (1.9, 3, True)],
+    [
+        (0, np.inf, True),
+        (0, 2, True),
+        (0, 1.99, False),
+        (2, 3, False),
+        (1.9, 3, True),
+        # What lies behind is never hit, and these bounds leave nothing.
+        (-np.inf, 2, True),
+        (-np.inf, -1, False),
+        (3, 1, False),
+        (np.nan, np.inf, False),
+        (0, np.nan, False),
+        (np.inf, np.inf, False),
+    ],
 )
 def test_interval(t_min: float, t_max: float, hit: bool) -> None:
     tree = KdTree(*TRIANGLE)
@@ -157,6 +170,8 @@ BAD_MESHES = {
     "float faces": (TRIANGLE[0], [(0.0, 1.0, 2.0)], "faces .*float64"),
     "large index": (TRIANGLE[0], [(0, 1, 3)], "vertex 3, but there are 3"),
     "negative index": (TRIANGLE[0], [(0, 1, -1)], "vertex -1"),
+    "ragged vertices": ([(0, 0, 0), (1, 0)], TRIANGLE[1], "vertices .*rows of one length"),
+    "ragged faces": (TRIANGLE[0], [(0, 1, 2), (0, 1)], "faces .*rows of one length"),
 }
 
 
@@ -172,6 +187,12 @@ BAD_RAYS = {
     "two columns": ((np.zeros((4, 2)), np.zeros((4, 2))), r"origins .*\(4, 2\)"),
     "different numbers": ((np.zeros((4, 3)), np.ones((5, 3))), r"\(4, 3\) and \(5, 3\)"),
     "text": (([("a", "b", "c")], DOWN[1]), "origins .*<U1"),
+    "ragged": (([(0, 0, 2), (0, 0)], DOWN[1]), "origins .*rows of one length"),
+    "masked": (
+        (np.ma.masked_array(DOWN[0], mask=[(1, 0, 0)]), DOWN[1]),
+        "origins .*no masked values",
+    ),
+    "masked t_max": ((*DOWN, 0, np.ma.masked_array([3.0], mask=[1])), "t_max .*masked"),
     "t_min": ((*DOWN, [0, 0]), r"t_min .*\(1,\), not \(2,\)"),
     "t_max": ((*DOWN, 0, [[1]]), r"t_max .*\(1, 1\)"),
 }

@@ -12,6 +12,7 @@ from bench_command import assert_one_sentence, command
 from mlrt_compare.bench import watertight, wrong_hits
 from mlrt_compare.bench.adversarial import RAYS, SCENES, SmallScene
 from mlrt_compare.bench.closed_meshes import sphere
+from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.hit_contenders import (
     FloatArray,
     HitArrays,
@@ -19,6 +20,7 @@ from mlrt_compare.bench.hit_contenders import (
     hit_contenders,
 )
 from mlrt_compare.bench.native import Native
+from mlrt_compare.bench.watertight_command import meshes_to_keep
 
 from mlrt_plugin import KdTree
 
@@ -49,7 +51,7 @@ def test_contenders_hit_the_same_in_easy_cases(native: Native) -> None:
 def test_leaks_are_counted() -> None:
     mesh = sphere(2)
     tree = KdTree(mesh.vertices, mesh.faces)
-    points = watertight.points_of(mesh, SEED)
+    field = watertight.range_of(mesh, SEED)
 
     def right(origins: FloatArray, directions: FloatArray) -> HitArrays:
         hits = tree.closest_hit(origins, directions)
@@ -62,23 +64,42 @@ def test_leaks_are_counted() -> None:
         return t, face
 
     for aim in watertight.AIMS:
-        found = watertight.trace(
-            mesh,
-            [HitContender("right", right), HitContender("losing", losing)],
-            aim, 700, SEED, points,
-        )  # fmt: skip
+        contenders = [HitContender("right", right), HitContender("losing", losing)]
+        found = watertight.trace(field, contenders, aim, 700, SEED)
         assert (found["right"].count, found["losing"].count) == (0, 100)
+        assert found["right"].rays == found["losing"].rays == 700
         assert len(found["losing"].examples) == watertight.KEPT
+
+
+def test_those_to_compare_with_trace_a_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watertight, "BATCH", 100)
+    called = {"first": 0, "second": 0}
+
+    def contender(name: str, face: int) -> HitContender:
+        def closest_hit(origins: FloatArray, directions: FloatArray) -> HitArrays:
+            called[name] += len(origins)
+            count = len(origins)
+            return np.ones(count, np.float32), np.full(count, face)
+
+        return HitContender(name, closest_hit)
+
+    field = watertight.range_of(sphere(1), SEED)
+    contenders = [contender("first", 0), contender("second", -1)]
+    found = watertight.trace(field, contenders, watertight.AIMS[0], 1750, SEED)
+    assert (found["first"].rays, found["first"].count) == (1750, 0)
+    # Batches 0 and 16, of 100 each.
+    assert (found["second"].rays, found["second"].count) == (200, 200)
+    assert called == {"first": 1750, "second": 200}
 
 
 @pytest.mark.parametrize("aim", watertight.AIMS, ids=lambda aim: aim.name)
 def test_rays_go_where_they_are_aimed(aim: watertight.Aim) -> None:
     mesh = sphere(2)
-    points = watertight.points_of(mesh, SEED)
+    field = watertight.range_of(mesh, SEED)
     rng = np.random.default_rng(SEED)
-    origins, directions = watertight.rays(mesh, rng, points, aim, 10_000)
-    starts = np.unique(origins, axis=0, return_index=True)[0]
-    assert (len(starts) <= 3) == aim.share_origin
+    origins, directions = watertight.rays(field, rng, aim, 10_000)
+    starts = len(np.unique(origins, axis=0))
+    assert starts == 3 if aim.share_origin else starts > 9_900
     ends = (origins + directions).astype(np.float64)
     corners = mesh.vertices[mesh.faces].astype(np.float64)
     a = np.concatenate(list(np.moveaxis(corners, 1, 0)))
@@ -89,6 +110,22 @@ def test_rays_go_where_they_are_aimed(aim: watertight.Aim) -> None:
         assert np.linalg.norm(nearest - end, axis=1).min() < 1e-6
         if aim.target == "vertices":
             assert np.linalg.norm(a - end, axis=1).min() < 1e-6
+
+
+def test_rays_of_one_origin_are_neighbours() -> None:
+    """Of a mesh with more faces than a run aims at: directions of a run differ less, and
+    those in a row far less."""
+    aims = {aim.share_origin: aim for aim in watertight.AIMS if aim.target == "vertices"}
+    field = watertight.range_of(sphere(6), SEED)
+    rng = np.random.default_rng(SEED)
+    assert len(field.mesh.faces) == 4 * watertight.NEIGHBOURS
+    turns = {}
+    for share_origin, aim in aims.items():
+        _, d = watertight.rays(field, rng, aim, watertight.SHARING)
+        d /= np.linalg.norm(d, axis=1, keepdims=True)
+        turns[share_origin] = np.median(np.linalg.norm(d[1:] - d[:-1], axis=1))
+        assert (np.linalg.norm(d.mean(axis=0)) > 0.5) == share_origin
+    assert 20 * turns[True] < turns[False]
 
 
 def test_wrong_hits_are_counted() -> None:
@@ -144,14 +181,42 @@ def test_watertight_command(native: Native, cache: Path, tmp_path: Path) -> None
     for scene in scenes:
         for row in scene["rows"]:
             assert list(row["leaks"]) == NAMES and row["rays"] == 600_000 // 30
-            assert row["leaks"]["MLRT"] == {"count": 0, "examples": []}
+            own = {"rays": 20_000, "count": 0, "examples": []}
+            assert row["leaks"]["MLRT"] == own
             assert f"{row['aim']}  " in child.stdout
     # Embree's default mode is known to lose rays at vertices.
     default = scenes[0]["rows"][0]["leaks"]["Embree default"]
     assert default["count"] > 1000 and len(default["examples"]) == watertight.KEPT
     assert figures["total"]["rays"] == 18 * 20_000
     assert figures["total"]["leaks"]["MLRT"] == 0
+    assert figures["total"]["traced"] == dict.fromkeys(NAMES, 360_000)
     assert "MLRT: 0 of 360,000 rays escape" in child.stdout
+
+
+def test_an_ended_run_is_continued(tmp_path: Path) -> None:
+    """Meshes that it finished are kept; a run of other rays is not continued."""
+    path = tmp_path / "figures.json"
+    figures = {
+        "benchmark": "watertight",
+        "settings": {"rays": 6, "seed": 1, "threads": 2, "meshes": ["a", "b", "c"]},
+        "machine": {"commit": "abc"},
+        "scenes": [
+            {"name": "a", "skipped": None, "rows": [1]},
+            {"name": "b", "skipped": "there is no b"},
+            {"name": "c", "skipped": None},
+        ],
+    }
+    assert meshes_to_keep(path, figures) == []
+    path.write_text(json.dumps(figures))
+    assert meshes_to_keep(path, figures) == figures["scenes"][:1]
+    other = figures | {"settings": {"rays": 7, "seed": 1, "meshes": ["a", "b", "c"]}}
+    with pytest.raises(BenchError, match="another benchmark, number of rays"):
+        meshes_to_keep(path, other)
+    path.write_text("[]")
+    with pytest.raises(BenchError, match="does not hold figures"):
+        meshes_to_keep(path, figures)
+    with pytest.raises(BenchError, match="--continue needs --json"):
+        meshes_to_keep(None, figures)
 
 
 def test_hits_command(native: Native, cache: Path, tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,16 +16,19 @@ from mlrt_compare.bench.kernels import (
     COHERENT,
     EXACT,
     TRAVERSALS,
+    Contender,
+    FloatArray,
     closed_meshes,
     compare,
-    far_off,
     kernel_contenders,
     rays_inside,
-    share_of_ties,
+    ties,
 )
 from mlrt_compare.bench.native import Native
 from mlrt_compare.bench.offset_scene import Placement
 from mlrt_compare.bench.offsets_command import measure
+
+from mlrt_plugin import KdTree
 
 SEED = 20261128
 KERNELS = [
@@ -91,13 +95,6 @@ def test_only_exact_tests_find_all(native: Native, aim: str) -> None:
         assert wrong["single precision"] > 100
 
 
-def test_hits_of_what_lies_behind_are_wrong_ones() -> None:
-    t = np.array([1, np.inf, 2, 1.0000001, np.inf], np.float32)
-    face = np.array([3, -1, 4, 5, -1])
-    exact_t = np.array([1, 1, 1, 1, np.inf], np.float32)
-    assert far_off(t, face, exact_t).tolist() == [False, False, True, False, False]
-
-
 def test_ties_at_vertices_are_told_from_wrong_faces() -> None:
     """Of an octahedron, whose vertices are exact: each of the four faces around one is as
     near as the others, and the opposite ones are not met."""
@@ -109,8 +106,35 @@ def test_ties_at_vertices_are_told_from_wrong_faces() -> None:
     origins = np.zeros((len(faces), 3), np.float32)
     directions = np.repeat(tip[None], len(faces), axis=0)
     t = np.ones(len(faces), np.float32)
-    for chosen, expected in ((faces[touches], 1.0), (faces[~touches], 0.0)):
-        assert share_of_ties(mesh, origins, directions, faces, t, chosen) == expected
+    assert (ties(mesh, origins, directions, faces, t) == touches).all()
+    assert not ties(mesh, origins, directions, faces, np.nextafter(t, 2)).any()
+
+
+def test_what_lies_behind_is_a_wrong_hit() -> None:
+    """Of two balls, faces of the outer one. Where t alone is off, the hit is right."""
+    mesh = closed_meshes(2)[-1]
+    tree = KdTree(mesh.vertices, mesh.faces)
+    outer = KdTree(mesh.vertices, mesh.faces[mesh.inner :])
+    rays = rays_inside(mesh, "anywhere", 300, SEED)
+
+    def exact(origins: FloatArray, directions: FloatArray) -> Any:
+        hits = tree.closest_hit(origins, directions)
+        return (hits.t, hits.primitive.astype(np.int64)), 1.0
+
+    def flawed(origins: FloatArray, directions: FloatArray) -> Any:
+        (t, face), seconds = exact(origins, directions)
+        behind = outer.closest_hit(origins, directions)
+        t[:7], face[:7] = behind.t[:7], behind.primitive[:7] + np.int64(mesh.inner)
+        t[7:20] *= np.float32(1.5)
+        t[20:25], face[20:25] = np.inf, -1
+        return (t, face), seconds
+
+    contenders = [Contender("exact", exact), Contender("flawed", flawed)]
+    right, row = compare(mesh, contenders, *rays, 1)
+    assert (right["leaks"], right["wrong_hits"], right["other_hits"]) == (0, 0, 0)
+    assert (row["leaks"], row["wrong_hits"], row["other_hits"]) == (5, 7, 12)
+    assert row["far_off"] == 7 and row["wrong_per_billion"] == 12 / 300 * 1e9
+    assert row["inexact_t"] == 13 and row["ulps_max"] > 10**6
 
 
 def test_shadow_rays_of_exact_tests_are_those_of_the_renderer(native: Native) -> None:

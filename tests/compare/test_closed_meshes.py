@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import workloads
@@ -11,7 +13,8 @@ from mlrt_compare.bench.closed_meshes import (
     boundary,
     chosen_meshes,
     closed,
-    inner_points,
+    distances,
+    inner_balls,
     is_inside,
     slivers,
     solid_angles,
@@ -99,7 +102,7 @@ def test_made_meshes(make: object, far: bool) -> None:
     mesh = (sphere(3) if make is sphere else slivers(5, 90)).checked()
     mesh = mesh.moved_far() if far else mesh
     rng = np.random.default_rng(SEED)
-    points = inner_points(mesh, rng, 20)
+    points = inner_balls(mesh, rng, 20).centers
     assert points.shape == (20, 3) and points.dtype == np.float32
     centre = (1e6 if far else 0) * np.ones(3)
     radius = np.linalg.norm(mesh.vertices.astype(np.float64) - centre, axis=1).max()
@@ -110,6 +113,40 @@ def test_made_meshes(make: object, far: bool) -> None:
         assert np.median(lengths) == pytest.approx(1, rel=0.1)
     elif make is slivers:
         assert (lengths.max(axis=1) / lengths.min(axis=1)).max() > 100
+
+
+@pytest.mark.parametrize("far", [False, True], ids=["at the origin", "far"])
+@pytest.mark.parametrize("make", [sphere, slivers], ids=["sphere", "slivers"])
+def test_meshes_surround_all_of_an_inner_ball(
+    make: Callable[[], ClosedMesh], far: bool
+) -> None:
+    """By winding numbers of points of the balls, and by distances of points of faces."""
+    mesh = make().moved_far() if far else make()
+    rng = np.random.default_rng(SEED)
+    balls = inner_balls(mesh, rng, 20)
+    assert (balls.radii > 0).mean() > 0.9
+    for point in balls.points(rng, np.arange(20)):
+        assert abs(winding_number(solid_angles(mesh, point))) == pytest.approx(1)
+    corners = mesh.vertices[rng.permutation(mesh.faces)[:2000]].astype(np.float64)
+    weights = rng.dirichlet((1, 1, 1), 50)
+    points = np.einsum("kj,njx->nkx", weights, corners).reshape(-1, 3)
+    for center, radius in zip(balls.centers, balls.radii, strict=True):
+        assert np.linalg.norm(points - center, axis=1).min() > radius
+
+
+def test_distances_of_triangles_are_those_of_their_points() -> None:
+    rng = np.random.default_rng(SEED)
+    corners = rng.normal(size=(200, 3, 3)) + rng.normal(size=(200, 1, 3))
+    corners[::10, 2] = corners[::10, 1]
+    steps = np.linspace(0, 1, 61)
+    u, v = (axis.ravel() for axis in np.meshgrid(steps, steps))
+    within = u + v <= 1
+    weights = np.stack([1 - u - v, u, v], axis=1)[within]
+    points = np.einsum("kj,njx->nkx", weights, corners)
+    sampled = np.linalg.norm(points, axis=2).min(axis=1)
+    found = distances(corners)
+    assert (found <= sampled + 1e-12).all()
+    np.testing.assert_allclose(found, sampled, atol=0.05)
 
 
 def test_meshes_by_name() -> None:

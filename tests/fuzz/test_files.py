@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 import scene_files
 import tree_file_parts
 from fuzz_cases import soup
@@ -222,6 +223,24 @@ ARGUMENTS = st.fixed_dictionaries(
 @settings(FUZZ)
 def test_arguments_of_render(process: FuzzProcess, arguments: dict[str, Any]) -> None:
     process("render_arguments", arguments)
+
+
+ELEMENTS = [
+    "element face -1\nelement face -1",
+    "element face -1",
+    "element face 0\nelement face 2",
+    f"element face {2**32 - 1}",
+    f"element face {2**64}",
+]
+
+
+@pytest.mark.parametrize("elements", ELEMENTS)
+def test_numbers_of_rows_that_make_no_sense(process: FuzzProcess, elements: str) -> None:
+    """The first was found by chance: of rows without a field NumPy divides by their size,
+    which ended the process."""
+    mesh = BINARY_PLY.replace(b"element face 2", elements.encode())
+    files = {"scene.xml": scene_with("mesh.ply"), "mesh.ply": mesh}
+    assert process("scene_file", files).startswith("refused: ")
 
 
 def test_what_should_be_done_and_refused(process: FuzzProcess) -> None:

@@ -38,7 +38,23 @@ def test_indices_are_refused_and_not_wrapped(builder: str, index: int) -> None:
 
 
 @covers(39)
-@pytest.mark.skip(reason="2^30 nodes and references take more than 12 GB of memory")
 def test_more_nodes_than_a_tree_can_hold() -> None:
-    """A number of a child has 30 bits. Files that claim such nodes are refused in
-    tests/kdtree/test_restoring.py."""
+    """A number of a child has 30 bits, that of a reference 32: what builders ask before
+    they add nodes or references, as so many take more than 12 GB. Files that claim them are
+    refused in tests/kdtree/test_restoring.py."""
+    check = core.kdtree_selftest.check_tree_size
+    check(2**30, 2**32 - 1)
+    for nodes in (2**30 + 1, 2**32, 2**32 + 1, 2**62 + 1):
+        with pytest.raises(ValueError, match=r"more than 2\^30 nodes"):
+            check(nodes, 0)
+    for references in (2**32, 2**32 + 1, 2**62):
+        with pytest.raises(ValueError, match=r"more than 2\^32 references"):
+            check(0, references)
+
+
+@covers(39)
+def test_more_faces_than_a_tree_can_hold() -> None:
+    """They are refused before an array of them is copied, which takes 12 GB."""
+    faces = np.broadcast_to(np.uint32([0, 1, 2]), (2**30 + 1, 3))
+    with pytest.raises(ValueError, match=r"1073741825 faces, more than a kd-tree can hold"):
+        KdTree(np.eye(3), faces)

@@ -1,4 +1,5 @@
-"""Hard cases of light and shadow, by pictures of small scenes."""
+"""Hard cases of light and shadow, by pictures of small scenes, which are the same by every
+traversal, from the root and from entry points, through finished and growing trees."""
 
 from __future__ import annotations
 
@@ -11,19 +12,30 @@ import numpy.typing as npt
 import pytest
 import render_scenes
 from hard_cases.case import covers
+from hard_cases.running import WAYS
 
 import mlrt_plugin
+from mlrt_plugin.render import prepare
 
 pytestmark = pytest.mark.usefixtures("scalar_variant")
 
 Picture = npt.NDArray[np.float32]
 SceneDict = dict[str, Any]
 OFFSETS = ("mitsuba", "robust")
+EAGER = ("exact", "fast")
 each_offset = pytest.mark.parametrize("offset", OFFSETS)
 
 
 def render(scene: SceneDict, offset: str = "mitsuba", **options: Any) -> Any:
-    return mlrt_plugin.render(scene, spp=1, shadow_offset=offset, **options)
+    """A picture, which every way of tracing and every builder must give."""
+    result = mlrt_plugin.render(scene, spp=1, shadow_offset=offset, **options)
+    prepared = {builder: prepare(scene, builder=builder) for builder in EAGER}
+    for name, way in WAYS.items():
+        # A lazy tree grows as it is traced.
+        for builder, other in {**prepared, "lazy": prepare(scene, builder="lazy")}.items():
+            picture = other.render(spp=1, shadow_offset=offset, **way).image
+            np.testing.assert_array_equal(picture, result.image, f"{name}, {builder}")
+    return result
 
 
 def grey(scene: SceneDict, offset: str = "mitsuba", **options: Any) -> Picture:

@@ -150,6 +150,12 @@ def make_parser() -> Parser:
         help="sphere, slivers, bunny, dragon, one of them with ' at 10^6' added, or an "
         "XML file (all usual ones)",
     )
+    watertight.add_argument(
+        "--continue",
+        dest="resume",
+        action="store_true",
+        help="keep the meshes that the file of --json has, and trace the others only",
+    )
     hits = commands.add_parser(
         "hits",
         help="adversarial rays against exact arithmetic",

@@ -122,11 +122,28 @@ def is_inside(angles: DoubleArray) -> bool:
     return whole and abs(winding) > 0.5 and float(np.abs(angles).max()) < 1.0
 
 
-def inner_points(mesh: ClosedMesh, rng: np.random.Generator, count: int) -> FloatArray:
-    """Points (count, 3) that every ray from which meets the mesh.
+@dataclass(frozen=True)
+class InnerBalls:
+    """Where rays may start: centres (N, 3) and radii (N,), float32.
 
-    Candidates are means of points of the mesh, two for each.
+    Every ray from within a ball meets the mesh, as no face reaches into it. Where a face is
+    too near to tell, the radius is 0.
     """
+
+    centers: FloatArray
+    radii: FloatArray
+
+    def points(self, rng: np.random.Generator, chosen: npt.NDArray[np.int64]) -> FloatArray:
+        """One (N, 3) in each of the chosen balls (N,)."""
+        # In the cube that the ball is around.
+        reach = self.radii[chosen, None] / np.float32(np.sqrt(3))
+        shift = 2 * rng.random((len(chosen), 3), np.float32) - np.float32(1)
+        points: FloatArray = self.centers[chosen] + reach * shift
+        return points
+
+
+def inner_balls(mesh: ClosedMesh, rng: np.random.Generator, count: int) -> InnerBalls:
+    """Candidates for centres are means of points of the mesh, two for each."""
     found: list[FloatArray] = []
     total = 0
     for _ in range(50):
@@ -140,7 +157,42 @@ def inner_points(mesh: ClosedMesh, rng: np.random.Generator, count: int) -> Floa
         total += len(inside)
     if total < count:
         raise BenchError(f"there is not enough room inside of the mesh {mesh.name}")
-    return np.concatenate(found)[:count]
+    centers = np.concatenate(found)[:count]
+    return InnerBalls(centers, free_radii(mesh, centers))
+
+
+def free_radii(mesh: ClosedMesh, centers: FloatArray) -> FloatArray:
+    """Of balls around the centers (N, 3), (N,): no face is as near, and points that are
+    rounded to floats stay within."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    middles = corners.mean(axis=1)
+    extents = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+    radii = np.zeros(len(centers))
+    for i, center in enumerate(centers.astype(np.float64)):
+        away = np.linalg.norm(middles - center, axis=1)
+        near = away - extents <= away.min()
+        distance = distances(corners[near] - center).min()
+        radii[i] = 0.9 * distance - 2 * np.spacing(np.float32(np.abs(center).max()))
+    return np.maximum(radii, 0).astype(np.float32)
+
+
+def distances(corners: DoubleArray) -> DoubleArray:
+    """Of triangles (N, 3, 3) from the origin, (N,)."""
+    edges = np.roll(corners, -1, axis=1) - corners
+    squares = np.einsum("nij,nij->ni", edges, edges)
+    along = -np.einsum("nij,nij->ni", corners, edges)
+    share = np.divide(along, squares, out=np.zeros_like(along), where=squares > 0)
+    nearest = corners + np.clip(share, 0, 1)[..., None] * edges
+    from_edges = np.linalg.norm(nearest, axis=2).min(axis=1)
+    normals = np.cross(edges[:, 0], edges[:, 1])
+    # Where the origin lies above or below the triangle, its plane is nearer than its edges.
+    sides = np.einsum("nij,nij->ni", np.cross(edges, -corners), normals[:, None])
+    lengths = np.linalg.norm(normals, axis=1)
+    inside = (sides >= 0).all(axis=1) & (lengths > 0)
+    height = np.abs(np.einsum("ni,ni->n", corners[:, 0], normals))
+    from_plane = np.divide(height, lengths, out=np.zeros_like(height), where=lengths > 0)
+    found: DoubleArray = np.where(inside, from_plane, from_edges)
+    return found
 
 
 def sphere(subdivisions: int = 5) -> ClosedMesh:

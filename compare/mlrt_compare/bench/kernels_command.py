@@ -104,7 +104,7 @@ def run(options: argparse.Namespace) -> bool:
 
 
 HEAD = (
-    *("test", "rays", "leaks", "wrong hits", "other hits", "wrong of 10^9"),
+    *("test", "rays", "leaks", "other hits", "wrong hits", "far off", "wrong of 10^9"),
     *("t inexact", "ulps p99", "max", "Mrays/s"),
 )
 
@@ -118,8 +118,9 @@ def cells(row: dict[str, Any]) -> tuple[str, ...]:
         row["name"],
         f"{row['rays']:,}",
         f"{row['leaks']:,}",
-        f"{row['wrong_hits']:,}",
         f"{row['other_hits']:,}",
+        f"{row['wrong_hits']:,}",
+        f"{row['far_off']:,}",
         f"{row['wrong_per_billion']:,.0f}",
         f"{row['inexact_t']:,}",
         f"{row['ulps_p99']:.0f}",
@@ -133,10 +134,15 @@ def markdown(figures: dict[str, Any]) -> str:
     page = [
         "# Tests of triangles and ways through the tree",
         "",
-        "By `mlrt-bench kernels`: leaks are rays that find nothing, wrong hits such of "
-        "what lies behind, other hits those of another face than the exact one, most of "
-        "which tie; then distances that are not the nearest float, and by how many units "
-        "in the last place.",
+        "By `mlrt-bench kernels`: leaks are rays that find nothing; other hits those of "
+        "another face than the exact one, most of which tie; wrong hits such of a face "
+        "that exact arithmetic does not have among the nearest; far off those of them that "
+        "are wrong by more than 2^-20 of the distance, which are no neighbours; wrong of "
+        "10^9 are leaks and wrong hits; then distances that are not the nearest float, and "
+        "by how many units in the last place.",
+        "",
+        *summary_lines(figures),
+        "",
         "",
         *machine_lines(figures["machine"]),
     ]

@@ -16,11 +16,11 @@ mpl.use("Agg")
 MARKS = "os^Dv"
 ERRORS = {
     "leaks": "leaks per million rays",
-    "wrong_hits": "wrong hits per million rays",
+    "wrong_hits": "wrong hits per million rays,\nline to those that are far off",
     "ulps_p99": "error of t in ulps: 99th percentile,\nline to the greatest",
 }
-"""What is drawn upwards, by its name in the figures. Hits of other faces at the same place
-are not among it: at vertices and edges faces tie, and each tracer may choose."""
+"""What is drawn upwards, by its name in the figures. Hits of other faces that tie with the
+exact one are not among it: at vertices and edges each tracer may choose."""
 
 
 def write_plot(path: Path, figures: dict[str, Any]) -> None:
@@ -62,7 +62,7 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
         row_of_panels[0].set_ylim(-0.4, max(2 * row_of_panels[0].get_ylim()[1], 10))
         row_of_panels[0].set_ylabel(label)
     for axes, aim in zip(panels[0], aims, strict=True):
-        axes.set_title(f"rays at {aim}")
+        axes.set_title("rays anywhere" if aim == "anywhere" else f"rays at {aim}")
     for axes in panels[-1]:
         axes.set_xlabel(f"Mrays/s, {plural(threads)}")
     tests = [
@@ -73,8 +73,10 @@ def write_plot(path: Path, figures: dict[str, Any]) -> None:
         axes.scatter([], [], color="black", marker=mark, label=mesh)
         for mesh, mark in zip(meshes, MARKS, strict=False)
     ]
-    figure.legend(handles=tests, loc="outside lower center", ncols=5, fontsize=9)
-    figure.legend(handles=marks, loc="outside upper center", ncols=5, fontsize=9)
+    free = figure.add_subplot(grid[1:, -1])
+    free.set_axis_off()
+    free.add_artist(free.legend(handles=tests, loc="upper left", title="colours"))
+    free.legend(handles=marks, loc="lower left", title="marks")
     figure.savefig(path, dpi=100)
 
 
@@ -84,13 +86,17 @@ def draw_row(axes: Axes, row: dict[str, Any], error: str, **style: Any) -> None:
         axes.scatter(rate, row["ulps_p99"], **style, s=28, alpha=0.85)
         axes.plot([rate, rate], [row["ulps_p99"], row["ulps_max"]], color=style["color"])
     else:
-        axes.scatter(rate, 1e6 * row[error] / row["rays"], **style, s=28, alpha=0.85)
+        share = 1e6 * row[error] / row["rays"]
+        axes.scatter(rate, share, **style, s=28, alpha=0.85)
+        if error == "wrong_hits":
+            far = 1e6 * row["far_off"] / row["rays"]
+            axes.plot([rate, rate], [far, share], color=style["color"])
 
 
 def draw_shadows(
     axes: Axes, figures: dict[str, Any], threads: int, names: list[str], colours: Any
 ) -> None:
-    """Mrays/s of shadow rays over pixels that are wrong, of all sizes of the scene: full
+    """Pixels that are wrong over Mrays/s of shadow rays, of all sizes of the scene: full
     marks for robust offsets, empty ones for Mitsuba's."""
     blocks = [block for block in figures["shadows"] if block["threads"] == threads]
     for row in blocks[0]["rows"]:
@@ -103,15 +109,15 @@ def draw_shadows(
         wrong = sum(other["acne"] + other["leaks"] for other in same)
         colour = colours(names.index(row["name"]) % 20)
         axes.scatter(
-            wrong,
             row["rays_per_second"] / 1e6,
+            wrong,
             edgecolors=[colour],
             facecolors=[colour] if row["offset"] == "robust" else "none",
         )
-    axes.set_xscale("symlog", linthresh=1)
-    axes.set_xlim(left=-0.4)
-    axes.set_ylim(bottom=0)
+    axes.set_xscale("log")
+    axes.set_yscale("symlog", linthresh=1)
+    axes.set_ylim(-0.4, max(2 * axes.get_ylim()[1], 10))
     axes.grid(True, alpha=0.25)
-    axes.set_ylabel("Mrays/s")
+    axes.set_xlabel(f"Mrays/s, {plural(threads)}")
     axes.set_title("shadow rays (full: robust offsets)")
-    axes.set_xlabel("pixels with acne or leaks")
+    axes.set_ylabel("pixels with acne or leaks")

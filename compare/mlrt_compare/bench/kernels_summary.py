@@ -24,9 +24,10 @@ ROWS = (
 def summary(figures: dict[str, Any]) -> list[Row]:
     """A row for each of ROWS, of the first number of threads.
 
-    rays_per_second: of rays through pixels of the first mesh. wrong_per_billion, leaks,
-    leaks_of, ulps_max: over all meshes and aims. shadow_rays_per_second, acne, dark_pixels
-    (lit ones), leaking, dark: of the shadow rays of all sizes.
+    rays_per_second: of rays through pixels of the first mesh. wrong_per_billion (leaks
+    too), far_per_billion of these, leaks, rays, ulps_max: over all meshes and aims.
+    shadow_rays_per_second, acne_pixels (of lit_pixels), leak_pixels (of dark_pixels): of
+    the shadow rays of all sizes.
     """
     threads = figures["settings"]["threads"][0]
     blocks = [
@@ -43,7 +44,8 @@ def summary(figures: dict[str, Any]) -> list[Row]:
             row for block in blocks for row in block["rows"] if row["name"] == contender
         ]
         rays = sum(row["rays"] for row in hits)
-        wrong = sum(row["wrong_per_billion"] * row["rays"] for row in hits) / rays
+        far = sum(row["leaks"] + row["far_off"] for row in hits)
+        wrong = sum(row["leaks"] + row["wrong_hits"] for row in hits)
         shaded = [
             row
             for block in shadows
@@ -55,7 +57,8 @@ def summary(figures: dict[str, Any]) -> list[Row]:
             {
                 "name": name,
                 "rays_per_second": of_pixels["rays_per_second"],
-                "wrong_per_billion": wrong,
+                "wrong_per_billion": 1e9 * wrong / rays,
+                "far_per_billion": 1e9 * far / rays,
                 "ulps_max": max(row["ulps_max"] for row in hits),
                 "leaks": sum(row["leaks"] for row in hits),
                 "rays": rays,
@@ -72,7 +75,7 @@ def summary(figures: dict[str, Any]) -> list[Row]:
 def summary_lines(figures: dict[str, Any]) -> list[str]:
     """Markdown."""
     head = (
-        *("", "Mrays/s, pixels", "Mrays/s, shadows", "wrong hits of 10^9"),
+        *("", "Mrays/s, pixels", "Mrays/s, shadows", "wrong hits of 10^9", "far off"),
         *("t error, ulps", "leaking rays", "acne pixels", "leaking pixels"),
     )
     rows = [
@@ -81,6 +84,7 @@ def summary_lines(figures: dict[str, Any]) -> list[str]:
             f"{row['rays_per_second'] / 1e6:.2f}",
             f"{row['shadow_rays_per_second'] / 1e6:.2f}",
             f"{row['wrong_per_billion']:,.0f}",
+            f"{row['far_per_billion']:,.0f}",
             f"{row['ulps_max']:,}",
             f"{row['leaks']:,} of {row['rays']:,}",
             f"{row['acne_pixels']:,} of {row['lit_pixels']:,}",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from pathlib import Path
 from typing import Any
 
 from mlrt_plugin.threads import thread_count
@@ -11,6 +13,7 @@ from mlrt_plugin.threads import thread_count
 from . import watertight
 from .checkout import find_checkout
 from .closed_meshes import ClosedMesh, chosen_meshes, usual_meshes
+from .errors import BenchError
 from .figures import measure_scenes, new_figures, show, write_json
 from .hit_contenders import hit_contenders
 from .machine import machine_record
@@ -20,6 +23,9 @@ from .status import show_status
 from .table import aligned
 from .watertight import AIMS, Leaks
 
+KEPT_SETTINGS = ("rays", "seed", "meshes")
+"""What must be the same where a run is continued."""
+
 
 def run(options: argparse.Namespace) -> bool:
     """Returns whether no ray escaped MLRT."""
@@ -28,6 +34,10 @@ def run(options: argparse.Namespace) -> bool:
     native = load_native(source, options.cache or default_cache())
     settings = {"rays": options.rays, "seed": options.seed, "threads": options.threads}
     figures = new_figures("watertight", machine_record(source, native), settings)
+    settings["meshes"] = [mesh.name for mesh in meshes]
+    if options.resume:
+        figures["scenes"] = meshes_to_keep(options.json, figures)
+    kept = {scene["name"] for scene in figures["scenes"]}
     share = max(1, options.rays // (len(meshes) * len(AIMS)))
 
     def measure(mesh: ClosedMesh, scene: dict[str, Any]) -> None:
@@ -35,13 +45,43 @@ def run(options: argparse.Namespace) -> bool:
             scene |= study(native, mesh, share, options.seed, options.threads)
         show(["", *lines(scene)])
 
-    measured = measure_scenes(
-        figures, meshes, lambda mesh: mesh.load(), measure, options.json
-    )
-    figures["total"] = total(measured)
+    left = [mesh for mesh in meshes if mesh.name not in kept]
+    if left:
+        measure_scenes(figures, left, lambda mesh: mesh.load(), measure, options.json)
+    figures["total"] = total(finished(figures))
     show(["", *total_lines(figures["total"])])
     write_json(options.json, figures)
     return bool(figures["total"]["leaks"]["MLRT"] == 0)
+
+
+def finished(figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Meshes that were traced to the end."""
+    return [scene for scene in figures["scenes"] if "rows" in scene]
+
+
+def meshes_to_keep(path: Path | None, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those that an ended run has finished, if there is its file.
+
+    Raises BenchError if the file cannot be read, or if the run had another number of rays,
+    seed, choice of meshes, or commit, as then its figures do not belong to those to come.
+    """
+    if path is None:
+        raise BenchError("--continue needs --json, the file of the run that was ended")
+    if not path.is_file():
+        return []
+    try:
+        earlier = json.loads(path.read_text())
+        belongs = earlier["benchmark"] == figures["benchmark"]
+        for part, key in (*(("settings", k) for k in KEPT_SETTINGS), ("machine", "commit")):
+            belongs &= earlier[part].get(key) == figures[part][key]
+        if belongs:
+            return finished(earlier)
+    except (OSError, ValueError, KeyError, AttributeError, TypeError) as error:
+        raise BenchError(f"{path} does not hold figures of `watertight`") from error
+    raise BenchError(
+        f"{path} is of another benchmark, number of rays, seed, choice of meshes or "
+        "commit: name another file"
+    )
 
 
 def study(
@@ -50,12 +90,13 @@ def study(
     """Figures of a mesh: a row for each aim."""
     show_status(f"{mesh.name}: preparing")
     start = time.perf_counter()
-    points = watertight.points_of(mesh, seed)
+    field = watertight.range_of(mesh, seed)
+    mesh = field.mesh
     contenders = hit_contenders(native, mesh.vertices, mesh.faces, threads)
     rows = []
     for number, aim in enumerate(AIMS):
         show_status(f"{mesh.name}: {aim.name}")
-        leaks = watertight.trace(mesh, contenders, aim, count, seed + number, points)
+        leaks = watertight.trace(field, contenders, aim, count, seed + number)
         rows.append({"aim": aim.name, "rays": count, "leaks": leaks_as_json(leaks)})
     show_status("")
     return {
@@ -67,7 +108,7 @@ def study(
 
 def leaks_as_json(leaks: dict[str, Leaks]) -> dict[str, Any]:
     return {
-        name: {"count": found.count, "examples": found.examples}
+        name: {"rays": found.rays, "count": found.count, "examples": found.examples}
         for name, found in leaks.items()
     }
 
@@ -77,8 +118,13 @@ def lines(scene: dict[str, Any]) -> list[str]:
     names = list(scene["rows"][0]["leaks"])
     table = [("", "rays", *names)]
     for row in scene["rows"]:
-        counts = (f"{row['leaks'][name]['count']:,}" for name in names)
-        table.append((row["aim"], f"{row['rays']:,}", *counts))
+        found = (row["leaks"][name] for name in names)
+        leaks = (
+            f"{each['count']:,}"
+            + ("" if each["rays"] == row["rays"] else f" of {each['rays']:,}")
+            for each in found
+        )
+        table.append((row["aim"], f"{row['rays']:,}", *leaks))
     head = f"{scene['name']}, {scene['triangles']:,} triangles, leaks:"
     return [head, *aligned(table)]
 
@@ -86,14 +132,20 @@ def lines(scene: dict[str, Any]) -> list[str]:
 def total(scenes: list[dict[str, Any]]) -> dict[str, Any]:
     rows = [row for scene in scenes for row in scene["rows"]]
     names = list(rows[0]["leaks"])
+
+    def sums(key: str) -> dict[str, int]:
+        return {name: sum(row["leaks"][name][key] for row in rows) for name in names}
+
     return {
         "rays": sum(row["rays"] for row in rows),
-        "leaks": {name: sum(row["leaks"][name]["count"] for row in rows) for name in names},
+        "traced": sums("rays"),
+        "leaks": sums("count"),
     }
 
 
 def total_lines(found: dict[str, Any]) -> list[str]:
-    return [
-        f"{name}: {count:,} of {found['rays']:,} rays escape, {count / found['rays']:.3g}"
-        for name, count in found["leaks"].items()
-    ]
+    lines = []
+    for name, count in found["leaks"].items():
+        rays = found["traced"][name]
+        lines.append(f"{name}: {count:,} of {rays:,} rays escape, {count / rays:.3g}")
+    return lines

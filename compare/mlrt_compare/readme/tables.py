@@ -298,8 +298,10 @@ def leak_lines(all_figures: Figures) -> list[str]:
     for figures in all_figures:
         total = figures["total"]
         for name, leaks in total["leaks"].items():
-            share = f"{100 * leaks / total['rays']:.2g} %" if leaks else "0"
-            rows.append([name, f"{total['rays']:,}", f"{leaks:,}", share])
+            # Others than MLRT trace a part of the rays.
+            rays = total.get("traced", {}).get(name, total["rays"])
+            share = f"{100 * leaks / rays:.2g} %" if leaks else "0"
+            rows.append([name, f"{rays:,}", f"{leaks:,}", share])
     return [
         "`mlrt-bench watertight`: rays from inside of closed meshes at vertices and edges "
         "that find nothing; [wrong-hits.md](compare/results/wrong-hits.md) has each mesh, "
