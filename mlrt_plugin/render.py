@@ -26,8 +26,8 @@ from .options import (
 )
 from .samplers import checked_spp, own_spp, possible_spp, rounded
 from .scene_arrays import Lighting, SceneArrays, same_geometry
-from .scene_import import SceneSource, import_scene
-from .shading_choice import ShadingChoice, choose_shading
+from .scene_import import SceneSource, import_scene, summarise
+from .shading_choice import ShadingChoice, choice_for
 from .shape_arrays import Shape
 from .texture_arrays import fields_of
 from .threads import thread_count
@@ -209,9 +209,8 @@ def prepare(
     if isinstance(scene, SceneArrays):
         arrays, choice = scene, NATIVE
     else:
-        choice = choose_shading(
-            scene, shading, sensor=sensor, defines=defines, lighting=lighting
-        )
+        summary = summarise(scene, sensor=sensor, defines=defines)
+        choice = choice_for(summary, shading, lighting or summary.lighting)
         if choice.path == "mitsuba":
             # Not loaded where it is not used: Mitsuba's llvm variant takes a while.
             from .hybrid.prepared import prepare_hybrid
@@ -228,6 +227,7 @@ def prepare(
                 previous=previous,
                 tree_cache=tree_cache,
                 build=build,
+                summary=summary,
             )
         arrays = import_scene(
             scene,
@@ -236,6 +236,7 @@ def prepare(
             resolution=resolution,
             lighting=lighting,
             force_direct=force_direct,
+            summary=summary,
         )
     build = {**arrays.lighting.own_options(BUILD_OPTIONS), **build}
     loaded = time.perf_counter()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from . import camera as cameras
 from . import (
@@ -43,24 +44,34 @@ ENVIRONMENTS = ("constant", "envmap", "sunsky", "timed_sunsky")
 
 @dataclass(frozen=True)
 class SceneSummary:
-    """What a scene uses, found without loading its meshes."""
+    """What a scene uses, found without loading its meshes.
+
+    root: its elements. parsed: what it was read from, None for a scene that was loaded.
+    """
 
     features: tuple[Feature, ...]
     lighting: Lighting
-    sensor_count: int
+    root: Element
+    parsed: parsing.ParsedScene | None = None
+
+    @property
+    def sensor_count(self) -> int:
+        return len(list(self.root.children_of("sensor")))
 
 
 @dataclass(frozen=True)
 class LoadedScene:
     """The objects of a loaded scene, each kind in the order of declaration.
 
-    groups: the shapes of each shapegroup, by its id.
+    groups: the shapes of each shapegroup, by its id. instances: what the scene says of
+    them, of which there may be very many.
     """
 
     shapes: list[Any]
     emitters: list[Any]
     sensors: list[Any]
     groups: dict[str, list[Any]] = field(default_factory=dict)
+    instances: list[Element] = field(default_factory=list)
 
     @staticmethod
     def of_parts(parts: list[Any]) -> LoadedScene:
@@ -88,6 +99,7 @@ def import_scene(
     resolution: tuple[int, int] | None = None,
     lighting: Lighting | None = None,
     force_direct: bool = False,
+    summary: SceneSummary | None = None,
 ) -> SceneArrays:
     """Reads a scene.
 
@@ -99,6 +111,8 @@ def import_scene(
     horizontal field of view is kept.
     lighting: what to render in place of what the scene's integrator asks for.
     force_direct: whether to render direct illumination where the integrator asks for more.
+    summary: what `summarise` gave for the same scene, sensor and defines, so that it is not
+    parsed again; each can be used once.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
@@ -125,32 +139,33 @@ def import_scene(
                 f"the scene is loaded in the variant {scene.variant_name()}: load it in an "
                 "RGB variant"
             )
+    if summary is None:
+        summary = summarise(scene, sensor=sensor, defines=defines)
+    names: dict[str, Element] = {}
+    if summary.parsed is None:
         sensors, sensor = sensors_of(scene, sensor)
-        root = elements.from_scene(scene, sensors)
-        names: dict[str, Element] = {}
         loaded = LoadedScene(list(scene.shapes()), list(scene.emitters()), sensors)
-        name = "the scene"
-    else:
-        parsed = parse(scene, defines)
-        root, name = parsed.root, f"scene '{parsed.name}'"
-    check_contents(root, sensor, name)
-    found = features.list_features(root, sensor)
+    found, parsed = summary.features, summary.parsed
+    name = f"scene '{parsed.name}'" if parsed is not None else "the scene"
+    check_contents(summary.root, sensor, name)
     features.refuse_unsupported(found)
     if lighting is None:
-        lighting = lighting_of(scene, root)
+        lighting = summary.lighting
     integrators.check_integrator(found, lighting, force_direct)
     obstacle = integrators.native_obstacle(found, lighting)
     if obstacle:
         raise UnsupportedFeature(obstacle)
     warnings = integrators.integrator_warnings(found, lighting, native=True)
-    if not is_loaded_scene(scene):
+    if parsed is not None:
         check_transforms(parsed)
         check_files(parsed)
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
-        parts, names = parsing.instantiate(parsed)
+        parts, names = parsing.instantiate(parsed, scene_objects.plain_instances(parsed))
         loaded = replace(
-            LoadedScene.of_parts(parts), groups=scene_objects.group_children(parsed, names)
+            LoadedScene.of_parts(parts),
+            groups=scene_objects.group_children(parsed, names),
+            instances=scene_objects.instances_of(parsed),
         )
     return collect(loaded, names, sensor, resolution, found, lighting, warnings)
 
@@ -164,14 +179,12 @@ def summarise(
     """
     if is_loaded_scene(scene):
         sensors, sensor = sensors_of(scene, sensor)
-        root = elements.from_scene(scene, sensors)
+        root, parsed = elements.from_scene(scene, sensors), None
     else:
-        root = parse(scene, defines).root
-    return SceneSummary(
-        features.list_features(root, sensor),
-        lighting_of(scene, root),
-        len(list(root.children_of("sensor"))),
-    )
+        parsed = parse(scene, defines)
+        root = parsed.root
+    found = features.list_features(root, sensor)
+    return SceneSummary(found, lighting_of(scene, root), root, parsed)
 
 
 def lighting_of(scene: SceneSource, root: Element) -> Lighting:
@@ -257,11 +270,14 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
 def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
     """Raises SceneError for a to_world that is not finite or flattens what it moves, of
     the shapes, the emitters and a sensor."""
-    for element in features.used_elements(parsed.root, sensor):
-        transform = element.properties.get("to_world")
-        if transform is None:
-            continue
-        objects.check_invertible(objects.matrix(transform), str(element))
+    moved = [
+        element
+        for element in features.used_elements(parsed.root, sensor)
+        if element.properties.get("to_world") is not None
+    ]
+    if moved:
+        matrices = [objects.matrix(e.properties["to_world"]) for e in moved]
+        objects.check_all_invertible(np.stack(matrices), moved)
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
@@ -314,7 +330,7 @@ def collect(
             )
         return str(element)
 
-    by_way = scene_objects.sorted_shapes(scene.shapes, scene.groups, names)
+    by_way = scene_objects.sorted_shapes(scene.shapes, scene.instances, scene.groups, names)
     shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
@@ -329,7 +345,6 @@ def collect(
     )
     others = scene_objects.gather_objects(
         by_way,
-        names,
         len(geometry.faces),
         name_of,
         # Their textures and masks are refused, so that no numbers in the tree count.

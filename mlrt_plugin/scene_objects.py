@@ -13,11 +13,13 @@ from . import elements, meshes, parsing
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError
+from .features import MESHES
 from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
 from .shape_arrays import NONE, Shape
 
 GROUP = "ShapeGroupPlugin"
-"""Mitsuba's class of the plugin `shapegroup`."""
+INSTANCE = "Instance"
+"""Mitsuba's classes of the plugins `shapegroup` and `instance`."""
 ROUND_ENOUGH = 1e-3
 """How much two axes of a sphere may differ, relatively; chosen."""
 
@@ -26,13 +28,14 @@ ROUND_ENOUGH = 1e-3
 class SortedShapes:
     """The shapes of a scene by the way rays meet them, in the order of declaration.
 
-    instances: with the id of their group each. groups: the shapes of each group that has
-    an instance, by its id, in the order in which they are referred to.
+    instances: what the scene says of them, with the id of their group each. groups: the
+    shapes of each group that has an instance, by its id, in the order in which they are
+    referred to.
     """
 
     meshes: list[Any] = field(default_factory=list)
     analytic: list[Any] = field(default_factory=list)
-    instances: list[tuple[Any, str]] = field(default_factory=list)
+    instances: list[tuple[Element, str]] = field(default_factory=list)
     groups: dict[str, list[Any]] = field(default_factory=dict)
 
 
@@ -42,24 +45,55 @@ def is_analytic(shape: Any) -> bool:
 
 
 def sorted_shapes(
-    shapes: list[Any], children: Mapping[str, list[Any]], names: Mapping[str, Element]
+    shapes: list[Any],
+    instances: list[Element],
+    children: Mapping[str, list[Any]],
+    names: Mapping[str, Element],
 ) -> SortedShapes:
     """Sorts loaded shapes.
 
-    children: the shapes of each group, by its id. names: elements by the ids of objects.
+    instances: see `instances_of`. children: the shapes of each group, by its id. names:
+    elements by the ids of objects.
     """
     ids = {id(element): id_ for id_, element in names.items()}
     result = SortedShapes()
     for shape in shapes:
         if is_analytic(shape):
             result.analytic.append(shape)
-        elif shape.class_name() == "Instance":
-            (group,) = (ids[id(child)] for _, child in names[shape.id()].children)
-            result.instances.append((shape, group))
-            result.groups.setdefault(group, children[group])
-        elif shape.class_name() != GROUP:
+        elif shape.class_name() not in (GROUP, INSTANCE):
             result.meshes.append(shape)
+    for element in instances:
+        (group,) = (ids[id(child)] for _, child in element.children)
+        result.instances.append((element, group))
+        result.groups.setdefault(group, children[group])
     return result
+
+
+def instances_of(parsed: parsing.ParsedScene) -> list[Element]:
+    """What a scene says of its instances, in the order of declaration."""
+    return [e for e in parsed.root.children_of("shape") if e.plugin == "instance"]
+
+
+def plain_instances(parsed: parsing.ParsedScene, of_meshes_only: bool = False) -> list[str]:
+    """Names, in the scene, of instances of which all is known without loading them: they
+    move a group that the scene declares, and say nothing else.
+
+    Mitsuba would take a tenth of a millisecond for each in an llvm variant, and much more
+    once they are in a scene. of_meshes_only: only instances of groups of triangle meshes.
+    """
+    groups = {
+        id(child)
+        for child in parsed.root.children_of("shape")
+        if child.plugin == "shapegroup"
+        and (not of_meshes_only or all(c.plugin in MESHES for _, c in child.children))
+    }
+    return [
+        name
+        for name, child in parsed.root.children
+        if child.plugin == "instance"
+        and child.properties.keys() <= {"to_world"}
+        and [id(group) in groups for _, group in child.children] == [True]
+    ]
 
 
 def group_children(
@@ -69,8 +103,9 @@ def group_children(
 
     names: elements by the ids of objects, as `parsing.instantiate` gives them.
     """
+    all_nodes = list(parsed.state.nodes)
     nodes = {
-        id_: parsed.state.nodes[int(id_[1:])]
+        id_: all_nodes[int(id_[1:])]
         for id_, element in names.items()
         if element.plugin == "shapegroup"
     }
@@ -82,7 +117,6 @@ def group_children(
 
 def gather_objects(
     scene: SortedShapes,
-    names: Mapping[str, Element],
     first_face: int,
     name_of: Callable[[Any], str],
     material_of: Callable[[Any], int],
@@ -90,9 +124,9 @@ def gather_objects(
 ) -> ObjectArrays | None:
     """Copies what is not in the tree out of loaded shapes; None if there is nothing.
 
-    names: elements by the ids of objects. first_face: how many faces the tree has. name_of:
-    what messages call a shape. material_of: the number of a shape's material. warnings:
-    grows by a sentence on each thing that is approximated.
+    first_face: how many faces the tree has. name_of: what messages call a shape.
+    material_of: the number of a shape's material. warnings: grows by a sentence on each
+    thing that is approximated.
 
     Raises SceneError for a shape without an extent and for a mesh that is broken.
     """
@@ -144,7 +178,7 @@ def gather_objects(
         )
         shape_names.append(name)
     numbers = {group: number for number, group in enumerate(scene.groups)}
-    maps, normals = placements(scene.instances, names)
+    maps, normals = placements([element for element, _ in scene.instances])
     return ObjectArrays(
         shapes=tuple(shapes),
         shape_names=tuple(shape_names),
@@ -179,7 +213,7 @@ def frame_of(shape: Any, name: str, warnings: list[str]) -> npt.NDArray[np.float
 
 
 def placements(
-    instances: list[tuple[Any, str]], names: Mapping[str, Element]
+    instances: list[Element],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """(I, 3, 4) maps of points to the world and (I, 3, 3) maps of normals.
 
@@ -188,8 +222,8 @@ def placements(
     """
     maps = np.tile(np.eye(3, 4), (len(instances), 1, 1))
     normals = np.tile(np.eye(3), (len(instances), 1, 1))
-    for number, (instance, _) in enumerate(instances):
-        to_world = names[instance.id()].properties.get("to_world")
+    for number, instance in enumerate(instances):
+        to_world = instance.properties.get("to_world")
         if to_world is not None:
             maps[number] = np.array(to_world.matrix)[:3]
             normals[number] = np.array(to_world.inverse_transpose)[:3, :3]

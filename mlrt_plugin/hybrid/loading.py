@@ -12,7 +12,15 @@ import numpy as np
 
 import mlrt_llvm
 
-from .. import camera, elements, features, integrators, parsing, scene_import
+from .. import (
+    camera,
+    elements,
+    features,
+    integrators,
+    parsing,
+    scene_import,
+    scene_objects,
+)
 from .. import mitsuba_objects as objects
 from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
@@ -65,6 +73,7 @@ def load_scene(
     resolution: tuple[int, int] | None = None,
     lighting: Lighting | None = None,
     force_direct: bool = False,
+    summary: scene_import.SceneSummary | None = None,
 ) -> MitsubaScene:
     """Loads a scene; arguments as of `scene_import.import_scene`.
 
@@ -86,7 +95,10 @@ def load_scene(
                 "parameters cannot be defined for a scene that is already loaded"
             )
         return of_loaded(source, reason, sensor, resolution, lighting, force_direct)
-    parsed = scene_import.parse(source, defines, VARIANT)
+    if summary is None or summary.parsed is None or isinstance(source, Mapping):
+        parsed = scene_import.parse(source, defines, VARIANT)
+    else:
+        parsed = summary.parsed.of_variant(VARIANT)
     if parsed.config.variant != VARIANT:
         raise UnsupportedFeature(
             f"the scene holds objects of the variant {parsed.config.variant} and needs "
@@ -135,17 +147,12 @@ def load_scene(
 def instantiated(parsed: parsing.ParsedScene) -> tuple[list[Any], dict[str, Element]]:
     """The parts of a scene, instances of meshes written out, and the elements by the ids of
     what they became."""
-    parts, by_id = parsing.instantiate(parsed)
-    nodes = {
-        id_: parsed.state.nodes[int(id_[1:])]
-        for id_, element in by_id.items()
-        if element.plugin == "shapegroup"
-    }
-    children = {
-        id_: [o for _, o in node.props.objects() if elements.kind_of(o) == "shape"]
-        for id_, node in nodes.items()
-    }
-    return without_instances(parts, by_id, children), by_id
+    parts, by_id = parsing.instantiate(
+        parsed, scene_objects.plain_instances(parsed, of_meshes_only=True)
+    )
+    children = scene_objects.group_children(parsed, by_id)
+    instances = scene_objects.instances_of(parsed)
+    return without_instances(parts, instances, by_id, children), by_id
 
 
 def of_loaded(
