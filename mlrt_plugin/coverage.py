@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .elements import Element
-from .features import REFUSED, reason_against
+from .features import LIGHT_TEXTURES, REFUSED, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
 from .materials import DELTA
 from .scene_arrays import Lighting
@@ -65,7 +65,8 @@ REMARKS = {
     "stop at it, as in `direct`; by Mitsuba where BSDF samples can find lights through it",
     **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in DELTA},
     **{("texture", plugin): ON_MESHES for plugin in VARYING},
-    ("emitter", "area"): "in constant colours; with textures by Mitsuba",
+    ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
+    "textures on rectangles that are not flipped; else by Mitsuba",
     ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
     ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
     ("emitter", "projector"): "its picture is looked up like a texture of a surface",

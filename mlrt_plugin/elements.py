@@ -149,6 +149,8 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
         nested["exterior"] = instance.exterior_medium()
         if element.plugin == "instance":
             element.properties["loaded"] = True
+        if element.plugin == "rectangle":
+            element.properties["flip_normals"] = bool(instance.has_flipped_normals())
     elif kind == "sensor":
         nested = {"film": instance.film(), "sampler": instance.sampler()}
     elif kind == "film":

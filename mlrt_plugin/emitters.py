@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
+from .materials import BLACK
 from .scene_arrays import Emitter, SceneArrays, Vec3, no_environment
 from .shape_arrays import NONE
 
@@ -26,10 +27,12 @@ def read_emitter(
     name: str,
     shape: int,
     corners: npt.NDArray[np.float32] | None,
+    texture: int = NONE,
 ) -> Emitter:
     """Reads one emitter.
 
-    shape: number of the shape that glows, for an area light.
+    shape: number of the shape that glows, for an area light. texture: number of what it
+    shows in place of one colour, for a `rectangle`.
     corners: (4, 3) vertices of that shape if it is a `rectangle`, which has its own way of
     sampling; in Mitsuba's order (0, 0), (1, 0), (0, 1), (1, 1) of (u, v).
     """
@@ -39,7 +42,7 @@ def read_emitter(
     if not (weight >= 0 and math.isfinite(weight)):
         raise SceneError(f"{name} has sampling_weight = {weight}: it must be at least 0")
     if plugin == "area":
-        radiance = objects.color(parts["radiance"], name)
+        radiance = BLACK if texture != NONE else objects.color(parts["radiance"], name)
         if corners is None:
             return Emitter("area", radiance, shape=shape, sampling_weight=weight)
         corner, along_u, along_v = corners[0], corners[1], corners[2]
@@ -47,6 +50,7 @@ def read_emitter(
             "area",
             radiance,
             shape=shape,
+            radiance_texture=texture,
             rectangle=True,
             corner=objects.vec3(corner),
             edge_u=objects.vec3(along_u - corner),

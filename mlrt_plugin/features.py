@@ -25,6 +25,8 @@ FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
 TEXTURES = (*CONSTANT_TEXTURES, *VARYING)
+LIGHT_TEXTURES = ("bitmap", "checkerboard")
+"""Of those that vary, what an area light can show."""
 
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
 REFUSED = {
@@ -77,10 +79,15 @@ def reason_against(element: Element) -> str:
     ):
         return "the texture of a spot is not supported yet"
     textures = [child.plugin for child in element.children_of("texture")]
-    if kind == "emitter" and set(textures) & set(VARYING):
-        return "textures of lights are not supported yet"
+    if kind == "emitter" and set(textures) & set(VARYING) - set(LIGHT_TEXTURES):
+        return f"of textures it can have {', '.join(LIGHT_TEXTURES)} only so far"
     if kind == "shape" and textures:
         return "textures that are attributes of a shape are not supported yet"
+    if kind == "shape" and has_textured_light(element):
+        if plugin != "rectangle":
+            return "lights with a texture are supported on rectangles only so far"
+        if element.properties.get("flip_normals", False):
+            return "its light has a texture and is turned by flip_normals"
     if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
         return "textures and masks on it are not supported yet"
     if plugin == "instance" and element.properties.get("loaded"):
@@ -101,6 +108,15 @@ def reason_against(element: Element) -> str:
     if plugin == "mask" and any(c.plugin == "mask" for c in element.children_of("bsdf")):
         return "a mask in a mask is not supported yet"
     return ""
+
+
+def has_textured_light(shape: Element) -> bool:
+    """Whether a shape is an area light whose radiance varies."""
+    return any(
+        texture.plugin in VARYING
+        for emitter in shape.children_of("emitter")
+        for texture in emitter.children_of("texture")
+    )
 
 
 def has_varying_parts(shape: Element) -> bool:

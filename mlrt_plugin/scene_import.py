@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from . import (
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
+from .loaded_scene import LoadedScene
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
@@ -57,38 +58,6 @@ class SceneSummary:
     @property
     def sensor_count(self) -> int:
         return len(list(self.root.children_of("sensor")))
-
-
-@dataclass(frozen=True)
-class LoadedScene:
-    """The objects of a loaded scene, each kind in the order of declaration.
-
-    groups: the shapes of each shapegroup, by its id. instances: what the scene says of
-    them, of which there may be very many.
-    """
-
-    shapes: list[Any]
-    emitters: list[Any]
-    sensors: list[Any]
-    groups: dict[str, list[Any]] = field(default_factory=dict)
-    instances: list[Element] = field(default_factory=list)
-
-    @staticmethod
-    def of_parts(parts: list[Any]) -> LoadedScene:
-        """Sorts objects by kind, the way a `scene` of Mitsuba does (scene.cpp)."""
-        scene = LoadedScene([], [], [])
-        for part in parts:
-            kind = elements.kind_of(part)
-            if kind == "shape":
-                scene.shapes.append(part)
-                if part.emitter() is not None:
-                    scene.emitters.append(part.emitter())
-            elif kind == "emitter" and objects.plugin_name(part) != "area":
-                # An area light that stands alone is only declared, for a shape to refer to.
-                scene.emitters.append(part)
-            elif kind == "sensor":
-                scene.sensors.append(part)
-        return scene
 
 
 def import_scene(
@@ -335,13 +304,19 @@ def collect(
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
-    surfaces = zip(
-        shapes, shape_names, geometry.first_faces, geometry.first_vertices, strict=True
-    )
-    rows = [materials.add(Surface(*surface), names) for surface in surfaces]
+    firsts = zip(geometry.first_faces, geometry.first_vertices, strict=True)
+    surfaces = [
+        Surface(shape, name, *first)
+        for shape, name, first in zip(shapes, shape_names, firsts, strict=True)
+    ]
+    rows = [materials.add(surface, names) for surface in surfaces]
+    lights = [materials.add_light(surface, names) for surface in surfaces]
     textured = materials.uses_coordinates()
     coordinates = gather_coordinates(
-        shapes, shape_names, [textured[row] for row in rows], geometry.first_vertices
+        shapes,
+        shape_names,
+        [textured[row] or light != NONE for row, light in zip(rows, lights, strict=True)],
+        geometry.first_vertices,
     )
     others = scene_objects.gather_objects(
         by_way,
@@ -387,6 +362,7 @@ def collect(
                 name_of(source),
                 shape,
                 meshes.rectangle_corners(geometry, shapes, shape),
+                lights[shape] if shape < len(lights) else NONE,
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),

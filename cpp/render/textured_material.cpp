@@ -8,8 +8,6 @@
 
 namespace mlrt {
 
-namespace {
-
 // Mitsuba's mesh.cpp: without texture coordinates the weights of the vertices b and c.
 TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t face,
                            float weight_b, float weight_c) {
@@ -28,6 +26,8 @@ TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t 
     at.uv = {mean(&Vec2f::x), mean(&Vec2f::y)};
     return at;
 }
+
+namespace {
 
 Vec3f reflectance(const SceneData &scene, const Material &material, bool front,
                   const TexturePoint &at) {

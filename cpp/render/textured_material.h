@@ -3,6 +3,7 @@
 
 #include "base/simd.h"
 #include "render/prepared_scene.h"
+#include "render/texture.h"
 
 #include <cstdint>
 
@@ -13,6 +14,10 @@ struct ShadedRays {
     const Vec3<FloatPacket> &origin, &direction;
     const UIntPacket &faces, &shapes;
 };
+
+// A place on a face of the tree, by the weights of its second and third vertex.
+TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t face,
+                           float weight_b, float weight_c);
 
 // The given lanes of `albedo`, those of shapes with a textured material replaced.
 Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &rays,

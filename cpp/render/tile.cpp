@@ -4,6 +4,7 @@
 #include "render/emitter_sampling.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
+#include "render/textured_light.h"
 #include "render/textured_material.h"
 
 #include <algorithm>
@@ -263,10 +264,14 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
             hidden |= holders;
             return;
         }
-        const Vec3f radiance = scene_.data.emitters[number].radiance;
-        for_each_lane(holders & seen_from_front, [&](uint32_t lane) {
+        const LaneBits lit = holders & seen_from_front;
+        if (lit == 0)
+            return;
+        const Vec3<FloatPacket> radiance = emitted_radiance(
+            scene_, number, {hit.origin, hit.direction, hit.faces, shapes}, lit);
+        for_each_lane(lit, [&](uint32_t lane) {
             for (int k = 0; k < 3; ++k)
-                values_[size_t(k)][rays[lane]] += radiance[k];
+                values_[size_t(k)][rays[lane]] += radiance[k].entry(lane);
         });
     });
     if (hidden != 0) {

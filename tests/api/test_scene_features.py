@@ -67,7 +67,17 @@ UNSUPPORTED = {
     },
     "area": {
         "shapes": '<shape type="rectangle"><emitter type="area" id="screen">'
+        '<texture type="mesh_attribute" name="radiance">'
+        '<string name="name" value="vertex_color"/></texture></emitter></shape>'
+    },
+    "cube": {
+        "shapes": '<shape type="cube" id="screen"><emitter type="area">'
         '<texture type="checkerboard" name="radiance"/></emitter></shape>'
+    },
+    "rectangle": {
+        "shapes": '<shape type="rectangle" id="screen"><emitter type="area">'
+        '<texture type="checkerboard" name="radiance"/></emitter>'
+        '<boolean name="flip_normals" value="true"/></shape>'
     },
     "roughconductor": {
         "shapes": '<shape type="cube"><bsdf type="roughconductor" id="tin"/></shape>'
