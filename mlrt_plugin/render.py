@@ -247,8 +247,9 @@ def prepare(
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
     others = obtain_objects(arrays.objects, len(arrays.faces), build, tree_cache)
     add_timings(obtained.timings, others.timings)
-    check_distances(arrays.emitters, common_bounds(obtained.tree, others.handle))
-    check_areas(arrays)
+    bounds = common_bounds(obtained.tree, others.handle)
+    check_distances(arrays.emitters, bounds)
+    check_areas(arrays, bounds)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,

@@ -103,8 +103,10 @@ AnalyticSample<Real> sample_sphere(const AnalyticShape &sphere, bool flipped,
     const Real distance = square_root(way_2);
     const Real cosine_there = absolute(dot(way * (one / distance), sample.normal));
     const Real by_area = Real(inverse_area) * way_2 / cosine_there;
-    const Real by_cone =
-        select(distance > zero, Real(1 / TWO_PI) / (one - cosine_max), zero);
+    // Where the cone closes in single precision, and Mitsuba finds no light: a series.
+    const Real closed = one - cosine_max;
+    const Real opening = select(closed > zero, closed, Real(0.5f) * sine_max_2);
+    const Real by_cone = select(distance > zero, Real(1 / TWO_PI) / opening, zero);
     sample.density = select(outside, by_cone, by_area);
     return sample;
 }

@@ -131,7 +131,7 @@ def load_scene(
     check_film(eye.film(), str(next(chosen.children_of("film"), chosen)))
     check_emitters(scene, {id_: str(element) for id_, element in by_id.items()})
     names = [str(by_id.get(shape.id(), shape.id())) for shape in shapes]
-    warnings += messages
+    warnings += [*messages, *small_lights(scene, shapes, names)]
     return MitsubaScene(
         scene,
         shapes,
@@ -194,6 +194,7 @@ def of_loaded(
         if isinstance(part, mi.Object) and part.class_name() == GROUP
     ]
     names = [str(elements.from_object(shape)) for shape in shapes]
+    warnings += small_lights(scene, shapes, names)
     return MitsubaScene(scene, shapes, groups, eye, names, lighting, tuple(warnings))
 
 
@@ -223,6 +224,30 @@ def is_finite(value: Any) -> bool:
     except (TypeError, ValueError, RuntimeError):
         return True
     return bool(np.isfinite(numbers).all())
+
+
+def small_lights(scene: Any, shapes: list[Any], names: list[str]) -> list[str]:
+    """A sentence on each shape that glows and in which Mitsuba's plugins find no light from
+    across the scene, as its cone of directions closes in single precision, or its density
+    has no number."""
+    bounds = scene.bbox()
+    extent = float(np.max(np.array(bounds.max) - np.array(bounds.min)))
+    return [
+        f"{name} glows and is so small in a scene that measures {extent:.3g} that "
+        "Mitsuba's plugins may find no light of it: enlarge it, or choose shading = native "
+        "if the scene allows"
+        for shape, name in zip(shapes, names, strict=True)
+        if shape.emitter() is not None
+        and objects.number(shape.surface_area()) < smallest_area(shape) * extent**2
+    ]
+
+
+def smallest_area(shape: Any) -> float:
+    """Of a light, as a share of the square of its distance, from where Mitsuba finds it."""
+    if objects.plugin_name(shape) != "sphere":
+        return 1e-12  # chosen: some 1e-20 is what its disks and cylinders need
+    # 1 - sin^2 is 1 in single precision below a sine of 2^-12.5.
+    return 4 * math.pi * 2.0**-25
 
 
 def check_film(film: Any, name: str) -> None:
