@@ -68,8 +68,10 @@ REMARKS = {
     ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
     "textures on rectangles that are not flipped; else by Mitsuba",
     ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
-    ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
-    ("emitter", "projector"): "its picture is looked up like a texture of a surface",
+    ("emitter", "spot"): "in constant colours, and without scale; else by Mitsuba",
+    ("emitter", "directional"): "without scale; else by Mitsuba",
+    ("emitter", "projector"): "rarely used, so that its sampling is not worth code here; "
+    "the image is the same",
     ("sensor", "orthographic"): "without shear; else by Mitsuba",
     ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",

@@ -107,7 +107,8 @@ class Places:
 
 
 def from_state(state: Any) -> list[Element]:
-    """The element of each node of a parsed scene; the first is the scene itself."""
+    """The element of each node of a parsed scene; the first is the scene itself. Objects
+    that are the same in all variants, images, count as properties."""
     elements = []
     places = Places([Path(str(file)) for file in state.files])
     # Scenes have a hundred thousand nodes: names of enumerations are looked up once.
@@ -131,7 +132,7 @@ def from_state(state: Any) -> list[Element]:
             kind, value = props.type(name), props[name]
             if kind is reference:
                 element.children.append((name, elements[value.index()]))
-            elif kind is instance:
+            elif kind is instance and value.variant_name():
                 element.children.append((name, from_object(value, name)))
             else:
                 element.properties[name] = value

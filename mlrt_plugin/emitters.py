@@ -223,7 +223,7 @@ def unit_axis(to_world: npt.NDArray[np.float64], name: str) -> Vec3:
     """
     axes = to_world[:3, :3]
     objects.check_finite(to_world, name)
-    if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-3):
+    if not np.allclose(axes.T @ axes, np.eye(3), atol=objects.ORTHOGONAL):
         raise UnsupportedFeature(
             f"{name} has a to_world that scales, which is not supported: use a rotation "
             "and a "

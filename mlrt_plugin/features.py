@@ -78,6 +78,8 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin in ("spot", "directional") and scales(element.properties.get("to_world")):
+        return "its to_world scales, which is not supported yet"
     textures = [child.plugin for child in element.children_of("texture")]
     if kind == "emitter" and set(textures) & set(VARYING) - set(LIGHT_TEXTURES):
         return f"of textures it can have {', '.join(LIGHT_TEXTURES)} only so far"
@@ -138,6 +140,18 @@ def shears(to_world: Any) -> bool:
     if not np.isfinite(matrix).all() or objects.is_singular(matrix):
         return False
     return not objects.is_orthogonal(matrix)
+
+
+def scales(to_world: Any) -> bool:
+    """Whether a transformation, None for none, is more than a rotation and a translation;
+    False also if it is not finite or flattens, which is told elsewhere."""
+    if to_world is None:
+        return False
+    matrix = objects.matrix(to_world)
+    if not np.isfinite(matrix).all() or objects.is_singular(matrix):
+        return False
+    axes = matrix[:3, :3]
+    return not np.allclose(axes.T @ axes, np.eye(3), atol=objects.ORTHOGONAL)
 
 
 def refuse_refused(scene: Element, sensor: int) -> None:

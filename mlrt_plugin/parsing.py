@@ -247,7 +247,7 @@ def with_known_integrators(scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def embedded_objects(value: object) -> Iterator[Any]:
-    """All Mitsuba objects that a scene dictionary holds."""
+    """All Mitsuba objects that a scene dictionary holds; images have no variant."""
     if isinstance(value, mi.Object):
         yield value
     elif isinstance(value, Mapping):

@@ -25,6 +25,7 @@ from . import (
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
+from .image_headers import check_image_file
 from .loaded_scene import LoadedScene
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
@@ -250,16 +251,22 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
-    """Raises SceneError for mesh files whose indices would make Mitsuba crash."""
+    """Raises SceneError for images without pixels, and for mesh files whose indices would
+    make Mitsuba crash."""
     checked = set()
     with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
+            for name in ("bitmap", "data"):
+                if 0 in np.shape(element.properties.get(name, 1)):
+                    raise SceneError(f"{element} has a {name} of no pixels: give it some")
             filename = element.properties.get("filename")
-            if element.kind != "shape" or filename is None:
+            if filename is None:
                 continue
             index = int(element.properties.get("shape_index", 0))
             path = parsing.resolved(str(filename))
-            if (path, index) not in checked:
+            if element.kind in ("texture", "emitter"):
+                check_image_file(path)
+            elif element.kind == "shape" and (path, index) not in checked:
                 checked.add((path, index))
                 check_mesh_file(path, element.plugin, index)
 

@@ -54,6 +54,10 @@ UNSUPPORTED = {
         '<bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape></shape>'
         '<shape type="instance"><ref id="group"/></shape>'
     },
+    "spot": {
+        "emitters": '<emitter type="spot"><transform name="to_world"><scale value="2"/>'
+        "</transform></emitter>"
+    },
     "sdfgrid": {"shapes": '<shape type="sdfgrid" id="ball"/>'},
     "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
     "envmap": {
