@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from .elements import Element
 from .features import LIGHT_TEXTURES, REFUSED, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
-from .materials import DELTA
+from .materials import SPECULAR
 from .scene_arrays import Lighting
 from .textures import VARYING
 
@@ -62,8 +62,9 @@ REMARKS = {
     ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours and with native textures",
     ("bsdf", "mask"): "of native materials, on meshes that are not instanced; shadow rays "
-    "stop at it, as in `direct`; by Mitsuba where BSDF samples can find lights through it",
-    **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in DELTA},
+    "stop at it, and BSDF samples find lights behind it, as in `direct`",
+    ("bsdf", "null"): "BSDF samples find lights behind it",
+    **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in SPECULAR},
     **{("texture", plugin): ON_MESHES for plugin in VARYING},
     ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
     "textures on rectangles that are not flipped; else by Mitsuba",
@@ -74,7 +75,10 @@ REMARKS = {
     "the image is the same",
     ("sensor", "orthographic"): "without shear; else by Mitsuba",
     ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
-    ("integrator", "path"): "with `max_depth` 1 or 2; else `--force-direct`",
+    ("integrator", "direct"): "with up to 256 samples of emitters and of BSDFs natively; "
+    "with more, and for lights in mirrors and glass, by Mitsuba",
+    ("integrator", "path"): "with `max_depth` 1, or 2, which is taken as `direct`; else "
+    "`--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
     ("integrator", "moment"): "by Mitsuba, around one `direct` or `path` with `max_depth` "

@@ -99,7 +99,7 @@ def reason_against(element: Element) -> str:
     if plugin == "orthographic" and shears(element.properties.get("to_world")):
         return "its to_world shears, which is not supported yet"
     if plugin == "envmap" and element.properties.get("mis_compensation", False):
-        return "mis_compensation counts on BSDF samples, which are not taken"
+        return "mis_compensation is not supported yet"
     if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
         return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(

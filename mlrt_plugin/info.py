@@ -9,7 +9,12 @@ import mlrt_llvm
 
 from .errors import SceneError
 from .features import MESHES, REFUSED
-from .integrators import TAKEN_OVER, check_integrator, integrator_warnings
+from .integrators import (
+    TAKEN_OVER,
+    check_integrator,
+    integrator_warnings,
+    takes_bsdf_samples,
+)
 from .scene_import import SceneSource, SceneSummary, import_scene, summarise
 from .shading_choice import choice_for
 
@@ -40,7 +45,7 @@ def scene_report(
     refusal = refusal_of(summary)
     if refusal:
         lines.append(f"needs --force-direct: {refusal}")
-    warnings = integrator_warnings(summary.features, summary.lighting, native)
+    warnings = integrator_warnings(summary.features, summary.lighting)
     if native and not other and not refusal:
         arrays = import_scene(scene, sensor=sensor, defines=defines, summary=summary)
         film = arrays.film
@@ -49,6 +54,7 @@ def scene_report(
             f"vertex normals: {'used' if len(arrays.normals) else 'not used'}",
             f"materials: {len(arrays.materials)}, emitters: {len(arrays.emitters)}",
             f"film: {film.width}x{film.height}, {film.filter} filter, {arrays.spp} spp",
+            light_samples(summary),
         ]
         warnings = list(arrays.warnings)
     if warnings:
@@ -60,6 +66,15 @@ def scene_report(
         except mlrt_llvm.LlvmUnavailable as error:
             lines.append(f"cannot be rendered: {error}")
     return lines
+
+
+def light_samples(summary: SceneSummary) -> str:
+    """How light is found natively."""
+    lighting = summary.lighting
+    if lighting.integrator == "depth":
+        return "light samples: none"
+    bsdfs = lighting.bsdf_samples if takes_bsdf_samples(summary.features, lighting) else 0
+    return f"light samples: {lighting.emitter_samples} of emitters, {bsdfs} of BSDFs"
 
 
 def verdict_on(kind: str, plugin: str, is_native: bool, path_is_native: bool) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
-from .materials import DELTA
+from .materials import SPECULAR
 from .options import INTEGRATOR_OPTIONS
 from .scene_arrays import Feature, Lighting
 
@@ -30,16 +30,13 @@ MISSING = {
 """What an integrator computes and `direct` does not."""
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
-NO_BSDF_SAMPLES = (
-    "BSDF samples are not taken, so lights that have an area or are all around are noisier "
-    "or less noisy than in Mitsuba; the expected image is the same"
-)
 POINTLIKE = ("point", "spot", "directional")
 """Emitters whose light comes from one direction at each point."""
 UNHITTABLE = (*POINTLIKE, "projector")
 """Emitters that no ray meets, so that BSDF samples find nothing of them."""
-MOST_EMITTER_SAMPLES = 256
-"""Of a camera sample, natively; chosen, as memory grows with them."""
+MOST_SAMPLES = 256
+"""Of emitters, and of BSDFs, of a camera sample, natively; chosen, as memory grows with
+them."""
 OWN_PARAMETERS = (
     "hide_emitters",
     "emitter_samples",
@@ -191,55 +188,45 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
     name = named(features, lighting)
     if lighting.integrator == "moment" and not what_is_missing(lighting):
         return f"{name} asks for second moments, which only the path by Mitsuba computes"
-    if lighting.emitter_samples == 0:
-        what = "max_depth" if lighting.integrator == "path" else "emitter_samples"
-        return (
-            f"{name} takes no emitter samples, and light is found by those only: raise "
-            f"its {what}"
-        )
-    if lighting.integrator == "mlrt" and lighting.bsdf_samples != 0:
-        return (
-            f"{name} takes no BSDF sample natively: set bsdf_samples to 0, or leave it out"
-        )
-    if lighting.emitter_samples > MOST_EMITTER_SAMPLES:
-        return (
-            f"{name} has emitter_samples = {lighting.emitter_samples}, and at most "
-            f"{MOST_EMITTER_SAMPLES} are taken natively: raise the samples per pixel "
-            "instead"
-        )
-    if lighting.bsdf_samples > 0 and any(
-        f.kind == "emitter" and f.plugin not in UNHITTABLE for f in features
-    ):
-        passing = [f for f in features if f.kind == "bsdf" and f.plugin in (*DELTA, "mask")]
-        if passing:
+    for what in ("emitter_samples", "bsdf_samples"):
+        count = getattr(lighting, what)
+        if count > MOST_SAMPLES:
             return (
-                f"lights in {passing[0]} are found by BSDF samples only, which {name} asks "
-                "for and which are not taken natively"
+                f"{name} has {what} = {count}, and at most {MOST_SAMPLES} are taken "
+                "natively: raise the samples per pixel instead"
+            )
+    if takes_bsdf_samples(features, lighting):
+        specular = [f for f in features if f.kind == "bsdf" and f.plugin in SPECULAR]
+        if specular:
+            return (
+                f"lights in {specular[0]} are found by BSDF samples, which {name} asks for "
+                "and which are not taken natively of such a material"
             )
     return ""
 
 
-def integrator_warnings(
-    features: tuple[Feature, ...], lighting: Lighting, native: bool
-) -> list[str]:
-    """What of the integrator's work is missing or done in another way, a sentence each."""
+def takes_bsdf_samples(features: tuple[Feature, ...], lighting: Lighting) -> bool:
+    """Whether BSDF samples are asked for and could find a light."""
+    return (
+        lighting.bsdf_samples > 0
+        and lighting.integrator != "depth"
+        and any(f.kind == "emitter" and f.plugin not in UNHITTABLE for f in features)
+    )
+
+
+def integrator_warnings(features: tuple[Feature, ...], lighting: Lighting) -> list[str]:
+    """What of the integrator's work is missing, or not what one would expect, a sentence
+    each."""
     name = named(features, lighting)
     missing = what_is_missing(lighting)
     if missing:
         return [f"{name}: only direct illumination is rendered; {missing} is missing"]
-    if not native or lighting.integrator == "depth":
+    if lighting.integrator == "depth" or lighting.emitter_samples < 2:
         return []
-    warnings = []
-    if lighting.emitter_samples > 1 and any(
-        f.kind == "emitter" and f.plugin in POINTLIKE for f in features
-    ):
-        warnings.append(
-            f"{name}: Mitsuba adds the light of {', '.join(POINTLIKE)} emitters "
+    if any(f.kind == "emitter" and f.plugin in POINTLIKE for f in features):
+        return [
+            f"{name}: the light of {', '.join(POINTLIKE)} emitters is added "
             f"{lighting.emitter_samples} times with emitter_samples = "
-            f"{lighting.emitter_samples} (its issue 1861), here it counts once"
-        )
-    if lighting.bsdf_samples > 0 and any(
-        f.kind == "emitter" and f.plugin in ("area", "constant", "envmap") for f in features
-    ):
-        warnings.append(f"{name}: {NO_BSDF_SAMPLES}")
-    return warnings
+            f"{lighting.emitter_samples}, as Mitsuba does it (its issue 1861): set it to 1"
+        ]
+    return []

@@ -17,7 +17,9 @@ from .shape_arrays import NONE
 from .textures import VARYING, Surface, TextureTable, child_of
 
 BLACK: Vec3 = (0.0, 0.0, 0.0)
-DELTA = ("conductor", "dielectric", "thindielectric", "null")
+SPECULAR = ("conductor", "dielectric", "thindielectric")
+"""BSDFs that mirror and refract."""
+DELTA = (*SPECULAR, "null")
 """BSDFs that no light sample finds, so that direct light leaves them black; what they
 mirror or let through is found by BSDF samples."""
 
@@ -32,11 +34,15 @@ class Side:
 
 @dataclass(frozen=True)
 class Material:
-    """Both sides, and the texture of the share of light that they reflect at all."""
+    """Both sides, and the texture of the share of light that they reflect at all.
+
+    passes: whether light goes straight through.
+    """
 
     front: Side = Side()
     back: Side = Side()
     opacity: int = NONE
+    passes: bool = False
 
 
 class MaterialTable:
@@ -65,6 +71,11 @@ class MaterialTable:
         rows = [(m.front.texture, m.back.texture, m.opacity) for m in self._rows]
         return np.array(rows, np.uint32).reshape(-1, 3)
 
+    def passes(self) -> tuple[bool, ...]:
+        """Which rows let all light straight through; empty if none does."""
+        rows = tuple(material.passes for material in self._rows)
+        return rows if any(rows) else ()
+
     def uses_coordinates(self) -> list[bool]:
         """Which rows depend on the texture coordinates of the surface."""
         return [
@@ -88,7 +99,7 @@ class MaterialTable:
     def _read(self, bsdf: Any, element: Element, surface: Surface) -> Material:
         plugin = objects.plugin_name(bsdf)
         if plugin in DELTA:
-            return Material()
+            return Material(passes=plugin == "null")
         parts = objects.members(bsdf)
         if plugin == "diffuse":
             return Material(self._side(parts["reflectance"], element, surface))
@@ -109,6 +120,8 @@ class MaterialTable:
             number = self.textures.add_scalar(
                 opacity, child_of(element, "opacity", opacity), surface
             )
+            if material.passes:
+                return material
             return Material(material.front, material.back, number)
         raise UnsupportedFeature(
             f"bsdf '{plugin}' of {surface.name} is not supported: only diffuse, twosided, "

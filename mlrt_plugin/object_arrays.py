@@ -18,12 +18,13 @@ class GroupArrays:
     """A shapegroup: its meshes, in its own frame, and how many analytic shapes it has.
 
     vertices: (V, 3) float32. faces: (F, 3) uint32. normals: (V, 3) float32, or (0, 3) if no
-    shape interpolates vertex normals.
+    shape interpolates vertex normals. uvs: (V, 2) float32, or (0, 2) if nothing needs any.
     """
 
     vertices: npt.NDArray[np.float32]
     faces: npt.NDArray[np.uint32]
     normals: npt.NDArray[np.float32]
+    uvs: npt.NDArray[np.float32]
     analytic_count: int
 
 

@@ -67,12 +67,13 @@ def obtain_objects(
             tree = obtained.tree
             warnings += obtained.warnings
             add_timings(timings, obtained.timings)
-        smooth = len(group.normals) > 0
+        has_vertices = len(group.normals) > 0 or len(group.uvs) > 0
         groups.append(
             {
                 "tree": tree,
-                "faces": group.faces if smooth else group.faces[:0],
+                "faces": group.faces if has_vertices else group.faces[:0],
                 "normals": group.normals,
+                "uvs": group.uvs,
                 "analytic_count": group.analytic_count,
             }
         )

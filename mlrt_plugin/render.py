@@ -164,7 +164,8 @@ class PreparedScene(RayQueries):
             progress,
             shadow_offset,
             {**dataclasses.asdict(sampler), "base_seed": self.arrays.base_seed},
-            max(1, self.lighting.emitter_samples),
+            0 if depth else self.lighting.emitter_samples,
+            0 if depth else self.lighting.bsdf_samples,
         )
         if progress is not None:
             progress(1.0)
@@ -253,7 +254,9 @@ def prepare(
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,
-        arrays.faces if len(arrays.normals) or arrays.textures else arrays.faces[:0],
+        arrays.faces
+        if len(arrays.normals) or arrays.textures or has_rows(arrays.uvs)
+        else arrays.faces[:0],
         arrays.normals,
         [dataclasses.asdict(shape) for shape in arrays.all_shapes()],
         arrays.materials,
@@ -266,6 +269,7 @@ def prepare(
         [fields_of(texture) for texture in arrays.textures],
         arrays.material_textures,
         others.handle,
+        arrays.material_passes,
     )
     return PreparedScene(
         arrays,
@@ -348,6 +352,11 @@ def render(
         )
         warn_of((m for m in result.warnings if m not in prepared.warnings), 2)
         return result
+
+
+def has_rows(array: npt.NDArray[Any] | None) -> bool:
+    """Whether an array is there and not empty."""
+    return array is not None and len(array) > 0
 
 
 def as_depth(depth: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

@@ -170,7 +170,8 @@ class SceneArrays:
     normals: (V, 3) float32, unit; (0, 3) if no shape interpolates vertex normals.
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
     material_textures: (M, 3) uint32, numbers of textures in place of these two, and of the
-    opacity, or NONE. uvs: (V, 2) float32; (0, 2) if no texture needs any.
+    opacity, or NONE. material_passes: which materials let all light straight through; empty
+    if none does. uvs: (V, 2) float32; (0, 2) if nothing needs any.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
     each. shape_names: what messages call the shapes. objects: what is not in these arrays:
@@ -198,6 +199,7 @@ class SceneArrays:
     not_finite_faces: tuple[int, ...] = ()
     textures: tuple[Texture, ...] = ()
     material_textures: npt.NDArray[np.uint32] | None = None
+    material_passes: tuple[bool, ...] = ()
     uvs: npt.NDArray[np.float32] | None = None
     sampler: Sampler = Sampler()
     environment: npt.NDArray[np.float32] = field(default_factory=no_environment)

@@ -125,7 +125,7 @@ def import_scene(
     obstacle = integrators.native_obstacle(found, lighting)
     if obstacle:
         raise UnsupportedFeature(obstacle)
-    warnings = integrators.integrator_warnings(found, lighting, native=True)
+    warnings = integrators.integrator_warnings(found, lighting)
     if parsed is not None:
         check_transforms(parsed)
         check_files(parsed)
@@ -319,11 +319,13 @@ def collect(
     rows = [materials.add(surface, names) for surface in surfaces]
     lights = [materials.add_light(surface, names) for surface in surfaces]
     textured = materials.uses_coordinates()
+    framed = integrators.takes_bsdf_samples(found, lighting)
     coordinates = gather_coordinates(
         shapes,
         shape_names,
         [textured[row] or light != NONE for row, light in zip(rows, lights, strict=True)],
         geometry.first_vertices,
+        framed,
     )
     others = scene_objects.gather_objects(
         by_way,
@@ -332,6 +334,7 @@ def collect(
         # Their textures and masks are refused, so that no numbers in the tree count.
         lambda shape: materials.add(Surface(shape, name_of(shape), 0, 0), names),
         geometry.warnings,
+        framed,
     )
     shape_of_emitter, emitter_of_shape = scene_objects.lights_of_shapes(
         by_way, others, sources
@@ -386,6 +389,7 @@ def collect(
         not_finite_faces=tuple(geometry.dropped),
         textures=tuple(materials.textures.textures),
         material_textures=materials.texture_array(),
+        material_passes=materials.passes(),
         uvs=coordinates.uvs,
         sampler=sampler,
         environment=emitters.environment_of(sources, name_of),

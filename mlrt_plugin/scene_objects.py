@@ -16,6 +16,7 @@ from .errors import SceneError
 from .features import MESHES
 from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
 from .shape_arrays import NONE, Shape
+from .texture_coordinates import gather_coordinates
 
 GROUP = "ShapeGroupPlugin"
 INSTANCE = "Instance"
@@ -121,12 +122,14 @@ def gather_objects(
     name_of: Callable[[Any], str],
     material_of: Callable[[Any], int],
     warnings: list[str],
+    with_coordinates: bool = False,
 ) -> ObjectArrays | None:
     """Copies what is not in the tree out of loaded shapes; None if there is nothing.
 
     first_face: how many faces the tree has. name_of: what messages call a shape.
     material_of: the number of a shape's material. warnings: grows by a sentence on each
-    thing that is approximated.
+    thing that is approximated. with_coordinates: whether the texture coordinates of meshes
+    are needed.
 
     Raises SceneError for a shape without an extent and for a mesh that is broken.
     """
@@ -141,11 +144,15 @@ def gather_objects(
         own_names = [name_of(shape) for shape in own]
         geometry = meshes.gather(own, own_names)
         warnings += geometry.warnings
+        coordinates = gather_coordinates(
+            own, own_names, [False] * len(own), geometry.first_vertices, with_coordinates
+        )
         groups.append(
             GroupArrays(
                 geometry.vertices,
                 geometry.faces,
                 geometry.normals,
+                coordinates.uvs,
                 len(children) - len(own),
             )
         )
@@ -158,6 +165,7 @@ def gather_objects(
                     material=material_of(shape),
                     vertex_normals=geometry.vertex_normals[number],
                     flip_normals=geometry.flip_normals[number],
+                    texture_coordinates=coordinates.present[number],
                 )
             )
         shape_names += own_names

@@ -22,14 +22,22 @@ class TextureCoordinates:
 
 
 def gather_coordinates(
-    shapes: list[Any], names: list[str], needed: list[bool], first_vertices: list[int]
+    shapes: list[Any],
+    names: list[str],
+    needed: list[bool],
+    first_vertices: list[int],
+    all_that_are: bool = False,
 ) -> TextureCoordinates:
     """Copies them out of loaded shapes; `needed` says of which.
 
-    Raises SceneError for a mesh that needs them and has some that are not finite.
+    all_that_are: also of those that can do without, for the frames that BSDF samples are
+    taken in. Raises SceneError for a mesh that needs them and has some that are not finite.
     """
     present = [
-        need and shape.has_vertex_texcoords()
+        bool(
+            shape.has_vertex_texcoords()
+            and (need or (all_that_are and np.isfinite(coordinates_of(shape)).all()))
+        )
         for shape, need in zip(shapes, needed, strict=True)
     ]
     warnings = [
@@ -45,7 +53,7 @@ def gather_coordinates(
     for shape, name, has, first in zip(shapes, names, present, first_vertices, strict=True):
         if not has:
             continue
-        own = np.array(shape.vertex_texcoords_buffer(), np.float32).reshape(-1, 2)
+        own = coordinates_of(shape)
         broken = int(np.count_nonzero(~np.isfinite(own).all(axis=1)))
         if broken:
             raise SceneError(
@@ -54,3 +62,8 @@ def gather_coordinates(
             )
         uvs[first : first + len(own)] = own
     return TextureCoordinates(uvs, present, warnings)
+
+
+def coordinates_of(shape: Any) -> npt.NDArray[np.float32]:
+    """(V, 2) of a shape that has some."""
+    return np.array(shape.vertex_texcoords_buffer(), np.float32).reshape(-1, 2)

@@ -40,7 +40,7 @@ class MitsubaRenderer:
         settings: Settings,
         integrator: Mapping[str, Any] | None = None,
     ) -> None:
-        """integrator: what to render, by default `direct` without BSDF samples."""
+        """integrator: what to render, by default that of `load_mitsuba_scene`."""
         mi.set_variant(VARIANT)
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings

@@ -36,7 +36,8 @@ def load_mitsuba_scene(
     """As mi.load_file does, with film size and integrator replaced; sets the
     variant.
 
-    integrator: what to render, by default `direct` without BSDF samples.
+    integrator: what to render, by default `direct` with as many samples as the scene's
+    integrator asks for.
     Raises SceneError, one sentence, if Mitsuba cannot load the scene.
     """
     mi.set_variant(variant)
@@ -58,7 +59,11 @@ def _loaded(
         state = mi.parser.parse_file(config, str(settings.scene), **settings.defines)
         _align(state, settings)
         hide_emitters = bool(_of_integrator(state, "hide_emitters", False))
-        emitter_samples = max(1, int(_of_integrator(state, "emitter_samples", 1)))
+        both = _of_integrator(state, "shading_samples", 1)
+        samples = {
+            name: int(_of_integrator(state, name, both))
+            for name in ("emitter_samples", "bsdf_samples")
+        }
         # Merging moves meshes to the end, and lights with them; the order of the
         # emitters decides what a random number means, so it has to stay as declared.
         config.merge_meshes = not any(
@@ -73,8 +78,7 @@ def _loaded(
             _resize(sensor, settings.resolution)
     default = {
         "type": "direct",
-        "emitter_samples": emitter_samples,
-        "bsdf_samples": 0,
+        **samples,
         "hide_emitters": hide_emitters,
     }
     spp = settings.spp or int(scene.sensors()[settings.sensor].sampler().sample_count())

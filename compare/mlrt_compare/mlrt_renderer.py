@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 import mlrt_plugin
 from mlrt_plugin.errors import MlrtError
-from mlrt_plugin.integrators import POINTLIKE, what_is_missing
+from mlrt_plugin.integrators import what_is_missing
 from mlrt_plugin.parsing import resolving_from
-from mlrt_plugin.render import PreparedScene, prepare
+from mlrt_plugin.render import prepare
 
 from .settings import Settings
 
@@ -72,21 +72,10 @@ class MlrtRenderer:
             }
         return {
             "type": "direct",
-            "emitter_samples": self._emitter_samples,
-            "bsdf_samples": lighting.bsdf_samples if self.by_mitsuba else 0,
+            "emitter_samples": lighting.emitter_samples,
+            "bsdf_samples": lighting.bsdf_samples,
             "hide_emitters": lighting.hide_emitters,
         }
-
-    @property
-    def _emitter_samples(self) -> int:
-        # Mitsuba adds the light of these as often as it is sampled (its issue 1861), the
-        # native path once.
-        prepared = self._prepared
-        if isinstance(prepared, PreparedScene) and any(
-            emitter.type in POINTLIKE for emitter in prepared.arrays.emitters
-        ):
-            return 1
-        return prepared.lighting.emitter_samples
 
     def frame(self, *, spp: int | None = None, seed: int | None = None) -> float:
         """Renders a frame and returns the seconds that it took.

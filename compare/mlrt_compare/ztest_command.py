@@ -358,7 +358,7 @@ def ztest_parser() -> argparse.ArgumentParser:
         "--authored",
         action="store_true",
         help="render references by the scene's own integrator, whose variance then counts, "
-        "in place of direct with one emitter sample, which MLRT renders",
+        "in place of direct with as many samples as MLRT takes",
     )
     parser.add_argument(
         "--cache",

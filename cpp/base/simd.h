@@ -58,6 +58,11 @@ using MaskOf = drjit::mask_t<T>;
 using LaneBits = uint32_t;
 inline constexpr LaneBits ALL_LANES = (1u << PACKET_WIDTH) - 1;
 
+// As many lanes as are given, or all.
+constexpr LaneBits first_lanes(uint32_t count) {
+    return count >= PACKET_WIDTH ? ALL_LANES : (1u << count) - 1;
+}
+
 template <typename T>
 T absolute(const T &a) {
     return drjit::abs(a);
@@ -176,6 +181,18 @@ inline float sum_of_lanes(const FloatPacket &a) {
     return drjit::sum(a);
 }
 
+// Bits that any lane has.
+inline uint32_t union_of_lanes(const UIntPacket &a) {
+#if defined(__AVX512F__)
+    return uint32_t(_mm512_reduce_or_epi32(a.m));
+#else
+    uint32_t bits = 0;
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        bits |= a.entry(lane);
+    return bits;
+#endif
+}
+
 inline bool any_lane(bool mask) {
     return mask;
 }
@@ -260,6 +277,18 @@ Packet load(const Value *values) {
 template <typename Packet, typename Value>
 void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
+}
+
+// The first values, fewer than a packet, and zeros; nothing behind them is read.
+inline FloatPacket load_first(const float *values, uint32_t count) {
+#if defined(__AVX512F__)
+    return FloatPacket(_mm512_maskz_loadu_ps(__mmask16(first_lanes(count)), values));
+#else
+    std::array<float, PACKET_WIDTH> padded{};
+    for (uint32_t lane = 0; lane < count; ++lane)
+        padded[lane] = values[lane];
+    return drjit::load<FloatPacket>(padded.data());
+#endif
 }
 
 // values[indices[lane]] in each lane; indices below 2^31.

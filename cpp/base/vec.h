@@ -47,6 +47,12 @@ struct Vec3 {
     }
 };
 
+// What value_of(axis) gives for each axis.
+template <typename ValueOf>
+constexpr auto by_axis(ValueOf &&value_of) -> Vec3<std::decay_t<decltype(value_of(0))>> {
+    return {value_of(0), value_of(1), value_of(2)};
+}
+
 using Vec2f = Vec2<float>;
 using Vec3f = Vec3<float>;
 using Vec3d = Vec3<double>;

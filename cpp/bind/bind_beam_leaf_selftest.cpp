@@ -6,7 +6,6 @@
 
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 #include <vector>
 
@@ -124,16 +123,18 @@ bool grid_may_hit(const BeamUnderTest &self, float p, float q, float half_p, flo
     return grid.may_hit(forms, 1) != 0;
 }
 
-// Rays in the order of their cells, and for each whether it lies beyond the best cut.
-std::vector<std::pair<uint32_t, bool>> order_of(const BeamUnderTest &self, float share) {
+std::vector<uint32_t> list_of(const RayNumbers &numbers) {
+    return {numbers.number.begin(), numbers.number.begin() + numbers.count};
+}
+
+// Rays in the order of their cells; and those before and beyond the best cut, if any.
+nb::tuple order_of(const BeamUnderTest &self, float share) {
     const Occupancy occupancy(self.beam);
-    const auto cut = occupancy.best_cut(share);
-    std::array<uint8_t, BeamPackets::MAX_RAYS> order;
-    const uint32_t count = occupancy.sorted(self.beam, order);
-    std::vector<std::pair<uint32_t, bool>> result;
-    for (uint32_t i = 0; i < count; ++i)
-        result.emplace_back(order[i], cut && occupancy.is_beyond(order[i], *cut));
-    return result;
+    RayNumbers before, beyond;
+    if (const auto cut = occupancy.best_cut(share))
+        occupancy.divide(self.beam, *cut, before, beyond);
+    return nb::make_tuple(list_of(occupancy.sorted(self.beam)), list_of(before),
+                          list_of(beyond));
 }
 
 } // namespace

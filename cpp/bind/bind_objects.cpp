@@ -28,6 +28,9 @@ using Maps = nb::ndarray<const double, nb::shape<-1, 3, 4>, nb::c_contig, nb::de
 using NormalMaps =
     nb::ndarray<const double, nb::shape<-1, 3, 3>, nb::c_contig, nb::device::cpu>;
 
+using Coordinates =
+    nb::ndarray<const float, nb::shape<-1, 2>, nb::c_contig, nb::device::cpu>;
+
 std::string numbered(const char *list, size_t i) {
     return std::string(list) + "[" + std::to_string(i) + "]";
 }
@@ -80,12 +83,18 @@ ObjectGroup group_from(nb::handle given, const std::string &name, ObjectSet &obj
             refuse_value(name + " must have as many faces as its tree, or none.");
         for (size_t i = 0; i < normals.shape(0); ++i)
             group.normals.push_back({normals(i, 0), normals(i, 1), normals(i, 2)});
+        if (dict.contains("uvs")) {
+            const auto uvs = nb::cast<Coordinates>(dict["uvs"]);
+            for (size_t i = 0; i < uvs.shape(0); ++i)
+                group.uvs.push_back({uvs(i, 0), uvs(i, 1)});
+        }
         for (size_t i = 0; i < faces.shape(0); ++i) {
             group.faces.push_back({faces(i, 0), faces(i, 1), faces(i, 2)});
             for (const uint32_t vertex : group.faces.back())
-                if (vertex >= normals.shape(0))
-                    refuse_value(name + " has a face that refers to a normal that does not "
-                                        "exist.");
+                for (const size_t vertices : {group.normals.size(), group.uvs.size()})
+                    if (vertices > 0 && vertex >= vertices)
+                        refuse_value(name + " has a face that refers to a vertex that does "
+                                            "not exist.");
         }
         if (count > 0xfffffff0u - objects.first_analytic_face)
             refuse_value("the scene must have fewer than 2^32 faces.");
@@ -226,9 +235,11 @@ void bind_objects(nb::module_ &m) {
              "analytic_types: uint32 (A,), 0 sphere, 1 disk, 2 cylinder; analytic_frames: "
              "float64 (A, 3, 4), from the shape's frame to the scene, or to its group: the "
              "first scene_analytic_count are of the scene, the others of the groups in "
-             "turn. groups: dicts of tree (KdTree or None), faces and normals (uint32 (F, "
-             "3), float32 (V, 3), or no rows where no shape has vertex normals), and "
-             "analytic_count. instance_groups: uint32 (I,); instance_maps: float64 (I, 3, "
+             "turn. groups: dicts of tree (KdTree or None), faces (uint32 (F, 3), or no "
+             "rows "
+             "where no shape has either of the following), normals (float32 (V, 3) or (0, "
+             "3)), uvs (float32 (V, 2) or (0, 2); may be left out), and analytic_count. "
+             "instance_groups: uint32 (I,); instance_maps: float64 (I, 3, "
              "4), from the group to the world; instance_normals: float64 (I, 3, 3), the "
              "same for normals. first_face: how many faces the tree beside has. Raises "
              "ValueError or TypeError for what does not fit together.")

@@ -22,23 +22,24 @@ namespace mlrt {
 namespace {
 
 constexpr const char *RENDER_DOCSTRING =
-    R"(Renders direct light from samples of emitters.
+    R"(Renders direct light from samples of emitters and of materials.
 
 options: fields of TraceOptions (mlrta/trace.h), names of enumerators as str; they never
 change the picture.
 sampler: fields of Sampler (render/spread_samples.h), the type by its name.
-emitter_samples: of each camera sample.
+emitter_samples, bsdf_samples: of each camera sample, weighed by the power heuristic if both
+are taken; light from one direction counts for each emitter sample, as in Mitsuba's `direct`.
 shadow_offset: where shadow rays begin and end, 'mitsuba' or 'robust' (render/shadow_offset.h).
 aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
 'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
 'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss); 'cost' (float32
-(H, W), nodes visited and triangles tested for a sample's camera and shadow ray, the mean of
-the pixel's samples, where rays that are traced together share alike) tells of the options.
+(H, W), nodes visited and triangles tested for all rays of a sample, the mean of the pixel's
+samples, where rays that are traced together share alike) tells of the options.
 progress: called as progress(done), done from 0 to 1, on the calling thread and at most
 about ten times a second.
 
 Returns a dict: image float32 (H, W, 3) over the film's crop, aovs, counters (fields of
-Counters, base/counters.h, after 'primary_' and 'shadow_'), seconds. Raises ValueError or
+Counters, base/counters.h, after 'primary_', 'shadow_' and 'bsdf_'), seconds. Raises ValueError or
 TypeError for bad arguments, KeyboardInterrupt on Ctrl-C, and whatever progress raises.)";
 
 AovSet aovs_from(const std::vector<std::string> &names) {
@@ -68,9 +69,9 @@ ShadowOffset shadow_offset_from(const std::string &name) {
 }
 
 void check_sampling(const Film &film, uint32_t spp, const Sampling &sampling) {
-    constexpr uint32_t MAX_EMITTER_SAMPLES = 256; // chosen: memory grows with them
-    if (sampling.emitter_samples == 0 || sampling.emitter_samples > MAX_EMITTER_SAMPLES)
-        refuse_value("emitter_samples must be from 1 to 256.");
+    constexpr uint32_t MOST = 256; // chosen: memory grows with them
+    if (sampling.emitter_samples > MOST || sampling.bsdf_samples > MOST)
+        refuse_value("emitter_samples and bsdf_samples must be at most 256.");
     if (!takes(sampling.sampler.type, spp))
         refuse_value("spp = " + std::to_string(spp) +
                      " is no number of samples that the sampler can take.");
@@ -83,7 +84,8 @@ void check_sampling(const Film &film, uint32_t spp, const Sampling &sampling) {
 nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
                       const nb::dict &options, const std::vector<std::string> &aovs,
                       nb::object progress, const std::string &shadow_offset,
-                      const nb::dict &sampler, uint32_t emitter_samples) {
+                      const nb::dict &sampler, uint32_t emitter_samples,
+                      uint32_t bsdf_samples) {
     if (spp == 0)
         refuse_value("spp must be at least 1.");
     if (!progress.is_none() && !PyCallable_Check(progress.ptr()))
@@ -94,7 +96,7 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     settings.trace = trace_options_from(options);
     settings.aovs = aovs_from(aovs);
     settings.shadow_offset = shadow_offset_from(shadow_offset);
-    settings.sampling = {sampler_from(sampler), emitter_samples};
+    settings.sampling = {sampler_from(sampler), emitter_samples, bsdf_samples};
     check_sampling(handle.scene->data.film, spp, settings.sampling);
 
     // Keeps the scene alive: another thread may drop the handle meanwhile.
@@ -123,6 +125,7 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
     nb::dict counters;
     counters.update(counters_to_dict(result.counters.primary, "primary_"));
     counters.update(counters_to_dict(result.counters.shadow, "shadow_"));
+    counters.update(counters_to_dict(result.counters.bsdf, "bsdf_"));
     nb::dict answer;
     answer["image"] = to_numpy(result.image.release(), {height, width, 3});
     answer["aovs"] = pictures;
@@ -154,7 +157,7 @@ void bind_render(nb::module_ &m) {
           nb::arg("options") = nb::dict(), nb::arg("aovs") = std::vector<std::string>(),
           nb::arg("progress") = nb::none(), nb::arg("shadow_offset") = "mitsuba",
           nb::arg("sampler") = nb::dict(), nb::arg("emitter_samples") = 1,
-          RENDER_DOCSTRING);
+          nb::arg("bsdf_samples") = 0, RENDER_DOCSTRING);
 }
 
 } // namespace mlrt

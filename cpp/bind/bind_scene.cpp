@@ -12,8 +12,10 @@
 #include <cstring>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/vector.h>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace nb = nanobind;
 
@@ -185,7 +187,8 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &environment,
                        const std::optional<Array<float>> &uvs, const nb::list &textures,
                        const std::optional<Array<uint32_t>> &material_textures,
-                       const nb::object &objects) {
+                       const nb::object &objects,
+                       const std::vector<bool> &material_passes) {
     SceneData scene;
     scene.tree = tree.tree;
     if (!objects.is_none()) {
@@ -200,6 +203,10 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
     scene.textures = textures_from(textures);
     scene.materials = materials_from(materials);
     add_textures(scene.materials, material_textures, scene.textures.size());
+    if (!material_passes.empty() && material_passes.size() != scene.materials.size())
+        refuse_value("material_passes must be empty or have as many entries as materials.");
+    for (size_t i = 0; i < material_passes.size(); ++i)
+        scene.materials[i].passes = material_passes[i];
     for (size_t i = 0; i < shapes.size(); ++i)
         scene.shapes.push_back(
             shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
@@ -320,6 +327,7 @@ void bind_scene(nb::module_ &m) {
             nb::arg("environment").none() = nb::none(), nb::arg("uvs") = nb::none(),
             nb::arg("textures") = nb::list(), nb::arg("material_textures") = nb::none(),
             nb::arg("objects") = nb::none(),
+            nb::arg("material_passes") = std::vector<bool>(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
             "vertex normals or textures. normals: float32 (V, 3) or (0, 3). shapes, "
             "emitters: lists of "
@@ -331,7 +339,7 @@ void bind_scene(nb::module_ &m) {
             "to_u and to_v, and squares as square_0 and square_1. material_textures: "
             "uint32 (M, 3), the texture of front, of back, and of the opacity; 2^32 - 1: "
             "none. objects: Objects beside the tree, or None; shapes cover their faces "
-            "too. "
+            "too. material_passes: which materials let all light straight through. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

@@ -17,8 +17,9 @@ std::string numbered(const char *list, size_t i) {
 void check_object(const SceneData &scene, const Shape &shape, const std::string &name) {
     const ObjectSet &objects = *scene.objects;
     if (objects.is_analytic(shape.first_face)) {
-        if (shape.face_count != 1 || shape.vertex_normals)
-            refuse_value(name + " is analytic and must have one face, without normals.");
+        if (shape.face_count != 1 || shape.vertex_normals || shape.texture_coordinates)
+            refuse_value(name + " is analytic and must have one face, without normals and "
+                                "texture coordinates.");
         if (shape.emitter != NONE &&
             shape.first_face - objects.first_analytic_face >= objects.scene_analytic_count)
             refuse_value(name + " glows, but belongs to a group.");
@@ -32,8 +33,10 @@ void check_object(const SceneData &scene, const Shape &shape, const std::string 
             if (shape.face_count >
                 group.tree->triangles.size() - (shape.first_face - group.first_face))
                 refuse_value(name + " must not have faces of several groups.");
-            if (shape.vertex_normals && group.faces.empty())
+            if (shape.vertex_normals && (group.faces.empty() || group.normals.empty()))
                 refuse_value(name + " has vertex normals, but its group has none.");
+            if (shape.texture_coordinates && (group.faces.empty() || group.uvs.empty()))
+                refuse_value(name + " has texture coordinates, but its group has none.");
         }
 }
 

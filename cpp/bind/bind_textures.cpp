@@ -159,12 +159,15 @@ void check_textures(const SceneData &scene) {
             shape.material == NONE ? Material{} : scene.materials[shape.material];
         const uint32_t light =
             shape.emitter == NONE ? NONE : scene.emitters[shape.emitter].radiance_texture;
+        if (is_object(scene, shape)) {
+            if (material.is_textured())
+                refuse_value(name + " has textures, but its faces are not in the tree.");
+            continue;
+        }
         const bool textured =
             material.is_textured() || shape.texture_coordinates || light != NONE;
         if (light != NONE && is_attribute(scene, light))
             refuse_value(name + " glows in an attribute of its mesh.");
-        if (textured && is_object(scene, shape))
-            refuse_value(name + " has textures, but its faces are not in the tree.");
         if (textured && scene.faces.empty())
             refuse_value(name + " has textures, but faces are empty.");
         for (uint32_t k = 0; k < shape.face_count && shape.texture_coordinates; ++k)

@@ -37,7 +37,8 @@ Vec2<DoubleOf<Real>> double_barycentrics_of(const Vec3<Origin> &origin,
     const Double w = absolute(dot(d, Vec3<Double>(cross(a, b))));
     const Double sum = u + v + w;
     const MaskOf<Double> has_area = sum > Double(0.0);
-    return {select(has_area, v / sum, Double(0.0)), select(has_area, w / sum, Double(0.0))};
+    const Double scale = select(has_area, Double(1.0) / sum, Double(0.0));
+    return {v * scale, w * scale};
 }
 
 // The same, rounded, and with a sum of at most one.

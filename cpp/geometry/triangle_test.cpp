@@ -141,8 +141,9 @@ Vec2f barycentrics(Vec3f origin, Vec3f direction, const Triangle &triangle) {
     const double sum = u + v + w;
     if (!(sum > 0))
         return {0, 0};
-    const float weight_b = float(v / sum);
-    return {weight_b, std::min(float(w / sum), 1 - weight_b)};
+    const double scale = 1 / sum;
+    const float weight_b = float(v * scale);
+    return {weight_b, std::min(float(w * scale), 1 - weight_b)};
 }
 
 } // namespace mlrt

@@ -207,21 +207,28 @@ bool BeamWalk<query>::walk(const Entry &entry) {
 
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     HitDistances &distances, uint32_t most_triangles, BeamPackets &beam,
+                     BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
                      Counters &counters) {
-    BeamTriangleTests<query> tests(tree, rays, distances, most_triangles, beam, counters);
-    BeamWalk<query> walk(tree, beam, tests, counters);
-    for (uint32_t i = 0; i < frontier.count; ++i)
-        if (!walk.walk(frontier.entries[i]))
-            return false;
-    return true;
+    BeamTriangleTests<query> tests(tree, rays, memory.distances, most_triangles, beam,
+                                   counters);
+    bool done = true;
+    if (memory.occluder_count > 0)
+        tests.test_first({memory.occluders.data(), memory.occluder_count});
+    if (!tests.all_done()) {
+        BeamWalk<query> walk(tree, beam, tests, counters);
+        for (uint32_t i = 0; i < frontier.count && done; ++i)
+            done = walk.walk(frontier.entries[i]);
+    }
+    std::ranges::copy(tests.hit(), memory.occluders.begin());
+    memory.occluder_count = uint32_t(tests.hit().size());
+    return done;
 }
 
 template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
-                                              const Frontier &, HitDistances &, uint32_t,
+                                              const Frontier &, BeamMemory &, uint32_t,
                                               BeamPackets &, Counters &);
 template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
-                                          const Frontier &, HitDistances &, uint32_t,
+                                          const Frontier &, BeamMemory &, uint32_t,
                                           BeamPackets &, Counters &);
 
 } // namespace mlrt

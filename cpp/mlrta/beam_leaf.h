@@ -11,7 +11,23 @@
 #include "mlrta/frontier.h"
 #include "mlrta/hit_distances.h"
 
+#include <array>
+#include <cstdint>
+
 namespace mlrt {
+
+// What the beams of a group leave to the next ones.
+struct BeamMemory {
+    BeamMemory(const KdTree &tree, Vec3f origin) : distances(tree, origin) {}
+
+    HitDistances distances;
+    float triangles_per_ray = 0; // tested against the beam; a moving average
+
+    // Triangles that stopped rays of the last beam, of Query::any: they are likely to stop
+    // those of the next one too, and tested first.
+    std::array<uint32_t, WIDE_WIDTH> occluders;
+    uint32_t occluder_count = 0;
+};
 
 // Finds for the active rays of a beam what they hit in the subtrees of a frontier: the
 // nearest triangles, or any. The group is the one that the beam was loaded from.
@@ -20,7 +36,7 @@ namespace mlrt {
 // what has been found till then is true of Query::any, and of no use otherwise.
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     HitDistances &distances, uint32_t most_triangles, BeamPackets &beam,
+                     BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
                      Counters &counters);
 
 } // namespace mlrt

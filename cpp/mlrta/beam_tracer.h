@@ -11,12 +11,6 @@
 
 namespace mlrt {
 
-// What the beams of a group leave to the next ones.
-struct BeamMemory {
-    HitDistances distances;
-    float triangles_per_ray = 0; // tested against the beam; a moving average
-};
-
 template <typename Output>
 class BeamTracer {
 public:
@@ -54,7 +48,7 @@ private:
             set_strays_apart(frontier);
             return;
         }
-        if (!camera_ && regroup(first, frontier, ordered))
+        if (!camera_ && regroup(frontier, ordered))
             return;
 
         uint32_t active = 0;
@@ -68,8 +62,8 @@ private:
                                   : std::numeric_limits<uint32_t>::max();
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
-        const bool done = trace_beam_leaf<Output::query>(
-            tree_, rays_, frontier, memory_.distances, most, beam, counters_);
+        const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
+                                                         most, beam, counters_);
         const float spent = float(counters_.beam_triangles - before) / float(active);
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
@@ -120,15 +114,10 @@ private:
 
     // Traces rays that go another way than the rest as a beam of their own.
     void set_strays_apart(const Frontier &frontier) {
-        RegroupedRays along, strays;
+        RayNumbers along, strays;
         for (uint32_t n = 0; n < beam_.count; ++n) {
-            const BeamPacket &packet = beam_.packets[n];
-            for_each_lane(packet.active, [&](uint32_t lane) {
-                along.add(rays_, packet.first_ray + lane);
-            });
-            for_each_lane(packet.strays, [&](uint32_t lane) {
-                strays.add(rays_, packet.first_ray + lane);
-            });
+            along.add(beam_.packets[n].first_ray, beam_.packets[n].active);
+            strays.add(beam_.packets[n].first_ray, beam_.packets[n].strays);
         }
         trace_regrouped(along, frontier, false);
         trace_regrouped(strays, frontier, false);
@@ -136,28 +125,29 @@ private:
 
     // Traces the parts of a beam whose rays leave a gap as beams of their own, or all in a
     // better order. Returns false if neither helps.
-    bool regroup(uint32_t first, const Frontier &frontier, bool ordered) {
+    bool regroup(const Frontier &frontier, bool ordered) {
         if (beam_.count == 1)
             return false;
         const Occupancy occupancy(beam_);
         const std::optional<Occupancy::Cut> cut = occupancy.best_cut(
             memory_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
                                                                  : USUAL_SHARE);
-        if (!cut && (ordered || !occupancy.is_disordered(beam_)))
+        if (cut) {
+            RayNumbers before, beyond;
+            occupancy.divide(beam_, *cut, before, beyond);
+            trace_regrouped(before, frontier, ordered);
+            trace_regrouped(beyond, frontier, ordered);
+            return true;
+        }
+        if (ordered || !occupancy.is_disordered(beam_))
             return false;
-        std::array<uint8_t, BeamPackets::MAX_RAYS> order;
-        const uint32_t active = occupancy.sorted(beam_, order);
-        RegroupedRays before, beyond;
-        for (uint32_t i = 0; i < active; ++i)
-            (cut && occupancy.is_beyond(order[i], *cut) ? beyond : before)
-                .add(rays_, first + order[i]);
-        trace_regrouped(before, frontier, true);
-        if (beyond.count > 0)
-            trace_regrouped(beyond, frontier, true);
+        trace_regrouped(occupancy.sorted(beam_), frontier, true);
         return true;
     }
 
-    void trace_regrouped(RegroupedRays &part, const Frontier &frontier, bool ordered) {
+    void trace_regrouped(const RayNumbers &numbers, const Frontier &frontier,
+                         bool ordered) {
+        RegroupedRays part(rays_, numbers);
         const RayGroup group = part.group(rays_);
         typename Output::Buffer buffer;
         Output output = output_.into(buffer);

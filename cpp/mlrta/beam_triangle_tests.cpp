@@ -23,6 +23,15 @@ Vec3f direction_of(const RayGroup &rays, uint32_t i) {
 
 } // namespace
 
+template <Query query>
+void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) {
+    for (const uint32_t primitive : primitives)
+        mailbox_.put(primitive);
+    std::copy(primitives.begin(), primitives.end(), waiting_.begin());
+    waiting_count_ = uint32_t(primitives.size());
+    flush();
+}
+
 // Where a beam meets many triangles, each leaf's are only fetched, to be tested when those
 // of the next have been as well: the memory has time to bring them, and blocks are full.
 template <Query query>
@@ -85,11 +94,18 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         pairs += uint32_t(std::popcount(packets));
     });
     counters_.triangle_tests += pairs;
-    LaneBits changed = 0;
+    LaneBits changed = 0, hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % PACKET_WIDTH, lane = pairs_[i] / PACKET_WIDTH;
-        changed |= LaneBits(test_packet(beam_.packets[n], forms, lane, numbers[lane])) << n;
+        const LaneBits found = test_packet(beam_.packets[n], forms, lane, numbers[lane]);
+        changed |= found << n;
+        hit |= found << lane;
     }
+    if constexpr (query == Query::any)
+        for_each_lane(hit, [&](uint32_t lane) {
+            if (hit_count_ < hit_.size())
+                hit_[hit_count_++] = numbers[lane];
+        });
     if (changed != 0)
         update_least(changed);
     for_each_lane(forms.unsafe, [&](uint32_t lane) { test_unsafe(numbers[lane]); });

@@ -12,6 +12,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 
 namespace mlrt {
 
@@ -46,6 +47,8 @@ public:
         update_least();
     }
 
+    // Tests up to WIDE_WIDTH triangles at once.
+    void test_first(std::span<const uint32_t> primitives);
     // Tests the triangles of a leaf, or puts them off till the next call or flush().
     void test_leaf(KdNode leaf);
     // Tests those that were put off.
@@ -57,6 +60,8 @@ public:
     bool all_done() const { return least_ == INFINITY; }
     // Whether the beam has been tested against all the triangles that it may be.
     bool spent() const { return triangles_left_ == 0; }
+    // Triangles that rays were found to hit, at most WIDE_WIDTH of them.
+    std::span<const uint32_t> hit() const { return {hit_.data(), hit_count_}; }
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
@@ -84,6 +89,8 @@ private:
     std::array<uint32_t, (WIDE_WIDTH + 1) * PACKET_WIDTH> pairs_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
+    std::array<uint32_t, WIDE_WIDTH> hit_;
+    uint32_t hit_count_ = 0;
     Mailbox mailbox_;
     float least_ = 0; // of all rays
     float far_end_ = 0;

@@ -7,22 +7,20 @@
 namespace mlrt {
 
 const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
-    Plane &known = planes_[primitive % SIZE];
-    if (known.primitive != primitive) {
+    std::optional<Plane> &known = planes_[primitive % SIZE];
+    if (!known || known->primitive != primitive) {
         const Triangle &triangle = tree_.triangles[primitive];
-        known.primitive = primitive;
-        known.plane = TrianglePlane(triangle);
-        known.numerator =
-            PlaneNumerator<double>(known.plane, Vec3d(triangle.a) - Vec3d(origin_));
+        const TrianglePlane plane(triangle);
+        known = {primitive, plane, {plane, Vec3d(triangle.a) - Vec3d(origin_)}};
     }
-    return known;
+    return *known;
 }
 
 FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                              const UIntPacket &primitives, Counters &counters) {
-    Vec3<DoublePacket> direction;
-    for (int k = 0; k < 3; ++k)
-        direction[k] = to_double(load_padded(rays.direction[k], first_ray, rays.count));
+    const auto direction = by_axis([&](int k) {
+        return to_double(load_padded(rays.direction[k], first_ray, rays.count));
+    });
     const DoublePacket max_direction = maximum(
         absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
     // Lanes without a triangle divide by one.

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 namespace mlrt {
 
@@ -24,9 +25,9 @@ public:
 
 private:
     struct Plane {
-        uint32_t primitive = NO_PRIMITIVE;
-        TrianglePlane plane{Triangle{}};
-        PlaneNumerator<double> numerator{plane, Vec3d{}};
+        uint32_t primitive;
+        TrianglePlane plane;
+        PlaneNumerator<double> numerator;
     };
 
     const Plane &plane_of(uint32_t primitive);
@@ -35,7 +36,7 @@ private:
 
     const KdTree &tree_;
     Vec3f origin_;
-    std::array<Plane, SIZE> planes_;
+    std::array<std::optional<Plane>, SIZE> planes_;
 };
 
 } // namespace mlrt

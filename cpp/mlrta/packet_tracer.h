@@ -59,14 +59,9 @@ public:
     }
 
 private:
-    // The first lanes, as many as are given or all.
-    static LaneBits lanes_below(uint32_t count) {
-        return count >= PACKET_WIDTH ? ALL_LANES : (1u << count) - 1;
-    }
-
     void trace_packets(uint32_t first, uint32_t count, const Frontier &frontier) {
         for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
-            trace_lanes(i, lanes_below(first + count - i), frontier);
+            trace_lanes(i, first_lanes(first + count - i), frontier);
     }
 
     void trace_either_way(uint32_t first, uint32_t count, const Frontier &frontier) {
@@ -172,7 +167,7 @@ private:
             const uint32_t begin = first + done;
             for (; done < count && active + PACKET_WIDTH <= MOST; done += PACKET_WIDTH) {
                 const auto packet = load_packet<Origin>(rays_, first + done);
-                const LaneBits in_run = lanes_below(count - done);
+                const LaneBits in_run = first_lanes(count - done);
                 const LaneBits lanes = (packet.rays.active | packet.extreme) & in_run;
                 counters_.packets += lanes != 0;
                 for_each_lane(lanes, [&](uint32_t lane) {

@@ -21,42 +21,42 @@ FloatPacket cell_of(const BeamPackets &beam, const BeamPacket &packet, int axis)
                    FloatPacket(Occupancy::SIDE - 0.5f));
 }
 
-// Columns and rows that any of the cells lies in, as bits.
-uint32_t columns_of(uint64_t cells) {
+// Cells of the smallest rectangle around those given.
+int area_around(uint64_t cells) {
+    if (cells == 0)
+        return 0;
+    const int rows = (std::bit_width(cells) - 1) / 8 - std::countr_zero(cells) / 8 + 1;
     cells |= cells >> 32;
     cells |= cells >> 16;
     cells |= cells >> 8;
-    return uint32_t(cells & 0xff);
-}
-uint32_t rows_of(uint64_t cells) {
-    uint32_t rows = 0;
-    for (int row = 0; row < 8; ++row)
-        rows |= uint32_t((cells >> (8 * row) & 0xff) != 0) << row;
-    return rows;
-}
-
-int length_of(uint32_t bits) {
-    return bits == 0 ? 0 : std::bit_width(bits) - std::countr_zero(bits);
-}
-
-// Cells of the smallest rectangle around those given.
-int area_around(uint64_t cells) {
-    return length_of(columns_of(cells)) * length_of(rows_of(cells));
+    const auto columns = uint8_t(cells);
+    return rows * (std::bit_width(columns) - std::countr_zero(columns));
 }
 
 } // namespace
 
+void RayNumbers::add(uint32_t first, LaneBits lanes) {
+    store_compressed(number.data() + count, lane_indices() + UIntPacket(first), lanes);
+    count += uint32_t(std::popcount(lanes));
+}
+
 Occupancy::Occupancy(const BeamPackets &beam) {
+    // Bits of cells, those of the lower and those of the upper half of the rectangle.
+    constexpr uint32_t HALF = SIDE * SIDE / 2;
+    const UIntPacket none(0u), one(1u);
+    UIntPacket lower = none, upper = none;
     for (uint32_t n = 0; n < beam.count; ++n) {
         const BeamPacket &packet = beam.packets[n];
-        const LaneArray<float> p = to_lanes<float>(cell_of(beam, packet, 0));
-        const LaneArray<float> q = to_lanes<float>(cell_of(beam, packet, 1));
-        for_each_lane(packet.active, [&](uint32_t lane) {
-            const uint32_t cell = uint32_t(8 * int(q[lane]) + int(p[lane]));
-            cell_[n * PACKET_WIDTH + lane] = uint8_t(cell);
-            cells_ |= uint64_t(1) << cell;
-        });
+        const UIntPacket column(cell_of(beam, packet, 0)), row(cell_of(beam, packet, 1));
+        const UIntPacket cell = UIntPacket(SIDE) * row + column;
+        store(&cell_[n * PACKET_WIDTH], cell);
+        const UIntPacket bit = select(from_bits<UIntPacket>(packet.active),
+                                      one << (cell & UIntPacket(HALF - 1)), none);
+        const auto in_lower = cell < UIntPacket(HALF);
+        lower = lower | select(in_lower, bit, none);
+        upper = upper | select(in_lower, none, bit);
     }
+    cells_ = uint64_t(union_of_lanes(upper)) << HALF | union_of_lanes(lower);
 }
 
 std::optional<Occupancy::Cut> Occupancy::best_cut(float share) const {
@@ -90,34 +90,56 @@ bool Occupancy::is_disordered(const BeamPackets &beam) const {
            DISORDER * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);
 }
 
-uint32_t Occupancy::sorted(const BeamPackets &beam,
-                           std::array<uint8_t, BeamPackets::MAX_RAYS> &rays) const {
-    // Bits of a column at even places, of a row at odd ones.
-    constexpr std::array<uint8_t, 8> spread{0, 1, 4, 5, 16, 17, 20, 21};
-    std::array<uint16_t, 65> first{};
-    const auto code = [&](uint32_t ray) {
-        return spread[cell_[ray] & 7] | spread[cell_[ray] >> 3] << 1;
-    };
-    for (uint32_t n = 0; n < beam.count; ++n)
-        for_each_lane(beam.packets[n].active,
-                      [&](uint32_t lane) { ++first[code(n * PACKET_WIDTH + lane) + 1]; });
-    for (int cell = 1; cell <= 64; ++cell)
-        first[cell] += first[cell - 1];
-    const uint32_t count = first[64];
-    for (uint32_t n = 0; n < beam.count; ++n)
-        for_each_lane(beam.packets[n].active, [&](uint32_t lane) {
-            const uint32_t ray = n * PACKET_WIDTH + lane;
-            rays[first[code(ray)]++] = uint8_t(ray);
-        });
-    return count;
+void Occupancy::divide(const BeamPackets &beam, Cut cut, RayNumbers &before,
+                       RayNumbers &beyond) const {
+    for (uint32_t n = 0; n < beam.count; ++n) {
+        const BeamPacket &packet = beam.packets[n];
+        const auto cell = load<UIntPacket>(&cell_[n * PACKET_WIDTH]);
+        const UIntPacket along =
+            cut.axis == 0 ? cell & UIntPacket(SIDE - 1) : cell / UIntPacket(SIDE);
+        const LaneBits lanes = to_bits(along >= UIntPacket(uint32_t(cut.cell)));
+        before.add(packet.first_ray, packet.active & ~lanes);
+        beyond.add(packet.first_ray, packet.active & lanes);
+    }
 }
 
-void RegroupedRays::add(const RayGroup &rays, uint32_t ray) {
-    for (int k = 0; k < 3; ++k)
-        direction[k][count] = rays.direction[k][ray];
-    t_min[count] = rays.t_min[ray];
-    t_max[count] = rays.t_max[ray];
-    number[count++] = ray;
+RayNumbers Occupancy::sorted(const BeamPackets &beam) const {
+    // Bits of a column at even places, of a row at odd ones.
+    constexpr std::array<uint8_t, SIDE> spread{0, 1, 4, 5, 16, 17, 20, 21};
+    std::array<uint32_t, SIDE * SIDE + 1> first{};
+    const auto code = [&](uint32_t cell) {
+        return spread[cell % SIDE] | spread[cell / SIDE] << 1;
+    };
+    const auto for_each_ray = [&](auto &&visit) {
+        for (uint32_t n = 0; n < beam.count; ++n)
+            for_each_lane(beam.packets[n].active, [&](uint32_t lane) {
+                visit(beam.packets[n].first_ray + lane,
+                      code(cell_[n * PACKET_WIDTH + lane]));
+            });
+    };
+    for_each_ray([&](uint32_t, int cell) { ++first[cell + 1]; });
+    for (int cell = 1; cell <= SIDE * SIDE; ++cell)
+        first[cell] += first[cell - 1];
+    RayNumbers numbers;
+    numbers.count = first[SIDE * SIDE];
+    for_each_ray([&](uint32_t ray, int cell) { numbers.number[first[cell]++] = ray; });
+    return numbers;
+}
+
+RegroupedRays::RegroupedRays(const RayGroup &rays, const RayNumbers &numbers)
+    : count(numbers.count) {
+    for (uint32_t i = 0; i < count; i += PACKET_WIDTH) {
+        // What lies behind the last one is not read, but must be a ray.
+        const LaneBits lanes = first_lanes(count - i);
+        const UIntPacket from =
+            select(from_bits<UIntPacket>(lanes), load<UIntPacket>(&numbers.number[i]),
+                   UIntPacket(numbers.number[0]));
+        for (int k = 0; k < 3; ++k)
+            store(&direction[k][i], gather(rays.direction[k], from));
+        store(&t_min[i], gather(rays.t_min, from));
+        store(&t_max[i], gather(rays.t_max, from));
+        store(&number[i], from);
+    }
 }
 
 RayGroup RegroupedRays::group(const RayGroup &from) {

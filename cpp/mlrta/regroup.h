@@ -10,6 +10,16 @@
 
 namespace mlrt {
 
+// Some rays of a beam, by number in the group that it was loaded from. What is written
+// there comes in whole packets.
+struct RayNumbers {
+    std::array<uint32_t, BeamPackets::MAX_RAYS + PACKET_WIDTH> number;
+    uint32_t count = 0;
+
+    // Those of sixteen rays from `first` on whose bit is set.
+    void add(uint32_t first, LaneBits lanes);
+};
+
 // Which parts of a beam's rectangle its rays go through: one bit a cell of a grid, row by
 // row, q upwards in rows and p in columns.
 class Occupancy {
@@ -28,20 +38,19 @@ public:
     // if together they cover no more than a share of that of all.
     std::optional<Cut> best_cut(float share) const;
 
-    bool is_beyond(uint32_t ray, Cut cut) const {
-        return int(cut.axis == 0 ? cell_[ray] & 7 : cell_[ray] >> 3) >= cut.cell;
-    }
+    // Adds the active rays to the lists of their sides, in their order.
+    void divide(const BeamPackets &beam, Cut cut, RayNumbers &before,
+                RayNumbers &beyond) const;
 
     // Whether packets overlap so much that rays had better be sorted.
     bool is_disordered(const BeamPackets &beam) const;
 
-    // Numbers of the active rays, from the beam's first on, cell by cell in Morton order.
-    uint32_t sorted(const BeamPackets &beam,
-                    std::array<uint8_t, BeamPackets::MAX_RAYS> &rays) const;
+    // The active rays, cell by cell in Morton order.
+    RayNumbers sorted(const BeamPackets &beam) const;
 
 private:
     uint64_t cells_ = 0;
-    std::array<uint8_t, BeamPackets::MAX_RAYS> cell_;
+    std::array<uint32_t, BeamPackets::MAX_RAYS> cell_; // of each ray that is active
 };
 
 // Rays in an order of their own, and their numbers in the group that they are taken from.
@@ -50,9 +59,9 @@ struct RegroupedRays {
     std::array<float, BeamPackets::MAX_RAYS> t_min, t_max;
     std::array<float, BeamPackets::MAX_RAYS> cost;
     std::array<uint32_t, BeamPackets::MAX_RAYS> number;
-    uint32_t count = 0;
+    uint32_t count;
 
-    void add(const RayGroup &rays, uint32_t ray);
+    RegroupedRays(const RayGroup &rays, const RayNumbers &numbers);
 
     // They alone, with the origin of the group that they are from.
     RayGroup group(const RayGroup &from);

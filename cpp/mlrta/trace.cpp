@@ -108,7 +108,7 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &o
             PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
     } else if (options.traversal == Traversal::beam_leaf ||
                options.traversal == Traversal::adaptive) {
-        BeamMemory memory{HitDistances(tree, rays.common_origin)};
+        BeamMemory memory(tree, rays.common_origin);
         trace_runs(BeamTracer<Output>(tree, rays, options, tile ? &tile->camera : nullptr,
                                       output, counters, memory));
     } else {

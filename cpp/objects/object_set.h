@@ -35,6 +35,7 @@ struct ObjectGroup {
     std::shared_ptr<const KdTree> tree;         // of its triangles, maybe none
     std::vector<std::array<uint32_t, 3>> faces; // numbers of vertices; empty if not needed
     std::vector<Vec3f> normals;                 // of the vertices, unit; empty likewise
+    std::vector<Vec2f> uvs;                     // texture coordinates of them; likewise
     uint32_t first_face = 0;                    // number of its first triangle
     uint32_t first_analytic = 0, analytic_count = 0;
 

@@ -8,17 +8,11 @@
 #include "base/simd.h"
 #include "geometry/analytic_shape.h"
 #include "render/shadow_offset.h"
+#include "render/unit_disk.h"
 
 #include <numbers>
 
 namespace mlrt {
-
-inline float sine(float a) {
-    return first_lane(sine(FloatPacket(a)));
-}
-inline float cosine(float a) {
-    return first_lane(cosine(FloatPacket(a)));
-}
 
 // The normal is the one that the shape has without flip_normals. Of a sphere, the density
 // is by solid angle; of others it is to be made from their area.
@@ -51,6 +45,14 @@ Vec3<Real> from_frame(const Vec3<Real> &n, const Vec3<Real> &v) {
     for (int k = 0; k < 3; ++k)
         result[k] = fused(n[k], v.z, fused(t[k], v.y, s[k] * v.x));
     return result;
+}
+
+// 1 minus the cosine of a cone. Where that closes in single precision, and Mitsuba finds no
+// light in it, half the square of the sine.
+template <typename Real>
+Real cone_opening(const Real &cosine, const Real &sine_squared) {
+    const Real opening = Real(1.0f) - cosine;
+    return select(opening > Real(0.0f), opening, Real(0.5f) * sine_squared);
 }
 
 // Uniform over the cone that the sphere fills, as seen from a point p outside of it
@@ -103,27 +105,17 @@ AnalyticSample<Real> sample_sphere(const AnalyticShape &sphere, bool flipped,
     const Real distance = square_root(way_2);
     const Real cosine_there = absolute(dot(way * (one / distance), sample.normal));
     const Real by_area = Real(inverse_area) * way_2 / cosine_there;
-    // Where the cone closes in single precision, and Mitsuba finds no light: a series.
-    const Real closed = one - cosine_max;
-    const Real opening = select(closed > zero, closed, Real(0.5f) * sine_max_2);
-    const Real by_cone = select(distance > zero, Real(1 / TWO_PI) / opening, zero);
+    const Real by_cone = select(
+        distance > zero, Real(1 / TWO_PI) / cone_opening(cosine_max, sine_max_2), zero);
     sample.density = select(outside, by_cone, by_area);
     return sample;
 }
 
-// Uniform over its area (Shirley and Chiu's concentric map).
+// Uniform over its area.
 template <typename Real>
 AnalyticSample<Real> sample_disk(const AnalyticShape &disk, Vec3f normal, const Real &x,
                                  const Real &y) {
-    constexpr float PI = std::numbers::pi_v<float>;
-    const Real a = fused(Real(2.0f), x, Real(-1.0f));
-    const Real b = fused(Real(2.0f), y, Real(-1.0f));
-    const MaskOf<Real> upright = absolute(a) < absolute(b);
-    const Real r = select(upright, b, a), other = select(upright, a, b);
-    Real phi = Real(0.25f * PI) * other / r;
-    phi = select(upright, Real(0.5f * PI) - phi, phi);
-    phi = select(r == Real(0.0f), Real(0.0f), phi);
-    const Real u = r * cosine(phi), v = r * sine(phi);
+    const auto [u, v] = on_disk(x, y);
     AnalyticSample<Real> sample;
     const Vec3f origin(disk.frame.origin), x_axis(disk.frame.axes[0]),
         y_axis(disk.frame.axes[1]);

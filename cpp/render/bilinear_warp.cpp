@@ -33,6 +33,7 @@ BilinearWarp::Level::Level(uint32_t columns, uint32_t rows)
 BilinearWarp::BilinearWarp(uint32_t width, uint32_t height, std::span<const float> values)
     : width_(width) {
     uint32_t columns = width - 1, rows = height - 1;
+    cells_ = {float(columns), float(rows)};
     cell_size_ = {1.0f / float(columns), 1.0f / float(rows)};
 
     const auto mean_of_cell = [&](uint32_t x, uint32_t y) {
@@ -112,6 +113,19 @@ BilinearWarp::Samples BilinearWarp::sample(const FloatPacket &x,
     return {{(FloatPacket(column) + u) * FloatPacket(cell_size_.x),
              (FloatPacket(row) + v) * FloatPacket(cell_size_.y)},
             mix(left, right, u)};
+}
+
+FloatPacket BilinearWarp::density(const Vec2<FloatPacket> &point) const {
+    const FloatPacket one(1.0f);
+    const FloatPacket x = to_unit(point.x) * FloatPacket(cells_.x);
+    const FloatPacket y = to_unit(point.y) * FloatPacket(cells_.y);
+    const FloatPacket column = minimum(floor(x), FloatPacket(cells_.x) - one);
+    const FloatPacket row = minimum(floor(y), FloatPacket(cells_.y) - one);
+    const UIntPacket corner = UIntPacket(column) + UIntPacket(row) * UIntPacket(width_);
+    const float *above = values_.data(), *below = above + width_;
+    const FloatPacket u = x - column;
+    return mix(mix(gather(above, corner), gather(above + 1, corner), u),
+               mix(gather(below, corner), gather(below + 1, corner), u), y - row);
 }
 
 } // namespace mlrt

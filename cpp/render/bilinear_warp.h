@@ -35,6 +35,9 @@ public:
     // Needs a function that does not vanish everywhere. x and y are in [0, 1).
     Samples sample(const FloatPacket &x, const FloatPacket &y) const;
 
+    // The density at points of the square; the same need.
+    FloatPacket density(const Vec2<FloatPacket> &point) const;
+
 private:
     // Sums over cells, or over squares of them. The four of a square lie side by side.
     struct Level {
@@ -51,6 +54,7 @@ private:
     };
 
     uint32_t width_ = 0;
+    Vec2f cells_{}; // how many along each side
     Vec2f cell_size_{};
     std::vector<float> values_; // mean 1 over the unit square
     std::vector<Level> levels_; // the finest first

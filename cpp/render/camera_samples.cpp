@@ -1,37 +1,18 @@
 #include "render/camera_samples.h"
 
 #include "base/simd.h"
+#include "render/unit_disk.h"
 
 #include <algorithm>
-#include <numbers>
 
 namespace mlrt {
-
-namespace {
-
-constexpr float PI = std::numbers::pi_v<float>;
-
-// A point of the unit disk, uniform if x and y are in [0, 1) (Shirley and Chiu 1997, "A low
-// distortion map between disk and square", in the form of Mitsuba's warp.h).
-Vec2<FloatPacket> on_disk(const FloatPacket &x, const FloatPacket &y) {
-    const FloatPacket zero(0.0f), two(2.0f), one(1.0f);
-    const FloatPacket a = fused(two, x, -one), b = fused(two, y, -one);
-    const auto steep = absolute(a) < absolute(b);
-    const FloatPacket r = select(steep, b, a), other = select(steep, a, b);
-    FloatPacket angle = FloatPacket(0.25f * PI) * other / r;
-    angle = select(steep, FloatPacket(0.5f * PI) - angle, angle);
-    angle = select((a == zero) & (b == zero), zero, angle);
-    return {r * cosine(angle), r * sine(angle)};
-}
-
-} // namespace
 
 CameraSamples::CameraSamples(const PreparedScene &scene, const SampleStreams &streams,
                              const Sampler &sampler, const PixelRect &sampled,
                              Wanted wanted)
     : scene_(scene), streams_(streams), sampler_(sampler), sampled_(sampled),
       wanted_(wanted), light_x_(std::max(1u, wanted.light_samples)),
-      light_y_(light_x_.size()) {}
+      light_y_(light_x_.size()), bsdf_(wanted.bsdf_samples) {}
 
 void CameraSamples::generate(const PixelGroup &group) {
     count_ = group.ray_count();
@@ -125,7 +106,9 @@ void CameraSamples::lay_out(const PixelGroup &group) {
 }
 
 // Mitsuba's integrator.cpp, render_sample: where in the pixel, where on the lens, when, and
-// then what the lights take.
+// then, in its direct.cpp, what the lights take, and the materials. There the numbers of a
+// material are drawn in the arguments of one call, of which its compilers take the last
+// first.
 void CameraSamples::make_room_for_numbers(size_t padded) {
     pairs_.assign(1, NumberPair{film_x_.data(), film_y_.data()});
     if (scene_.plane.type == CameraType::thinlens) {
@@ -140,6 +123,12 @@ void CameraSamples::make_room_for_numbers(size_t padded) {
         light_y_[sample].resize(padded);
         if (sample < wanted_.light_samples)
             pairs_.push_back({light_x_[sample].data(), light_y_[sample].data()});
+    }
+    for (BsdfNumbers &numbers : bsdf_) {
+        for (std::vector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
+            array->resize(padded);
+        pairs_.push_back({numbers.x.data(), numbers.y.data()});
+        pairs_.push_back({numbers.part.data(), nullptr});
     }
 }
 

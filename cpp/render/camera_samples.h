@@ -15,10 +15,11 @@ namespace mlrt {
 class CameraSamples {
 public:
     // What is wanted besides the rays: positions on the film, and for how many samples of
-    // lights numbers.
+    // lights and of materials numbers.
     struct Wanted {
         bool film_positions = false;
         uint32_t light_samples = 0;
+        uint32_t bsdf_samples = 0;
     };
 
     CameraSamples(const PreparedScene &scene, const SampleStreams &streams,
@@ -41,6 +42,11 @@ public:
     // Numbers in [0, 1) of a sample of lights that is wanted; zeros if none is.
     const float *light_x(uint32_t sample) const { return light_x_[sample].data(); }
     const float *light_y(uint32_t sample) const { return light_y_[sample].data(); }
+    // Numbers in [0, 1) of a sample of materials that is wanted: two for the direction, and
+    // one that chooses a part of the material.
+    const float *bsdf_x(uint32_t sample) const { return bsdf_[sample].x.data(); }
+    const float *bsdf_y(uint32_t sample) const { return bsdf_[sample].y.data(); }
+    const float *bsdf_part(uint32_t sample) const { return bsdf_[sample].part.data(); }
 
 private:
     void lay_out(const PixelGroup &group);
@@ -66,6 +72,10 @@ private:
     std::vector<uint32_t> seed_, stream_;
     std::vector<float> film_x_, film_y_, lens_u_, lens_v_;
     std::vector<std::vector<float>> light_x_, light_y_;
+    struct BsdfNumbers {
+        std::vector<float> x, y, part;
+    };
+    std::vector<BsdfNumbers> bsdf_;
     std::vector<NumberPair> pairs_; // in the order in which they are drawn
     std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
 };

@@ -157,11 +157,13 @@ Environment::Samples sample_environment(const PreparedScene &scene, const FloatP
 }
 struct OneEnvironmentSample {
     Vec3f direction, weight;
+    float density;
 };
 OneEnvironmentSample sample_environment(const PreparedScene &scene, float x, float y) {
-    const auto [d, w] = scene.environment.sample(FloatPacket(x), FloatPacket(y));
+    const auto [d, w, density] = scene.environment.sample(FloatPacket(x), FloatPacket(y));
     return {{first_lane(d.x), first_lane(d.y), first_lane(d.z)},
-            {first_lane(w.x), first_lane(w.y), first_lane(w.z)}};
+            {first_lane(w.x), first_lane(w.y), first_lane(w.z)},
+            first_lane(density)};
 }
 
 // A distance that leads out of the scene, wherever p is.
@@ -170,18 +172,19 @@ Real way_out(const PreparedScene &scene, const Vec3<Real> &p) {
     return Real(2.0f) * maximum(Real(scene.radius), length(p - spread<Real>(scene.center)));
 }
 
-// Light of one emitter; choice_weight is 1 / the probability that it was chosen.
+// Light of one emitter; choice_weight is 1 / the probability that it was chosen. `density`
+// as in sample_chosen.
 template <typename Real>
 EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
                                const Real &choice_weight, const Vec3<Real> &p,
-                               const Real &x, const Real &y) {
+                               const Real &x, const Real &y, Real *density = nullptr) {
     const Emitter &emitter = scene.data.emitters[number];
     const EmitterTable &table = scene.emitter_tables[number];
     const Real zero(0.0f), one(1.0f);
     EmitterSample<Real> sample;
     sample.target_face = all_of<Real>(NONE);
     MaskOf<Real> has_light(true);
-    Real factor = zero;
+    Real factor = zero, by_direction(INFINITY);
     Vec3<Real> radiance = spread<Real>(emitter.radiance);
 
     switch (emitter.type) {
@@ -209,10 +212,12 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     }
     case EmitterType::constant:
     case EmitterType::envmap: {
-        const auto [direction, weight] = sample_environment(scene, x, y);
+        const auto [direction, weight, by_direction] = sample_environment(scene, x, y);
         sample.direction = direction;
         sample.target = p + way_out(scene, p) * direction;
         sample.weight = choice_weight * weight;
+        if (density)
+            *density = by_direction / choice_weight;
         return sample;
     }
     case EmitterType::area: {
@@ -228,6 +233,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
             sample.direction = light.direction;
             has_light = light.is_lit;
             factor = choice_weight / light.density;
+            by_direction = light.density;
             break;
         }
         AreaPoint<Real> point;
@@ -248,13 +254,16 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         sample.target_face = point.face;
         sample.direction = to_light * (one / distance);
         const Real cosine = dot(sample.direction, point.normal);
-        const Real density = by_area * (squared / -cosine);
+        by_direction = by_area * (squared / -cosine);
         // False also for a point on the light itself, where the direction is not a number.
-        has_light = (cosine < zero) & (density > zero) & (density < Real(INFINITY));
-        factor = choice_weight / density;
+        has_light =
+            (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
+        factor = choice_weight / by_direction;
         break;
     }
     }
+    if (density)
+        *density = by_direction / choice_weight;
     for (int k = 0; k < 3; ++k)
         sample.weight[k] = select(has_light, factor * radiance[k], zero);
     return sample;
@@ -301,8 +310,9 @@ EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x)
 
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
                                          const EmitterChoices &choices,
-                                         const Vec3<FloatPacket> &p, const FloatPacket &y) {
-    return sample_one(scene, emitter, choices.weight, p, choices.x, y);
+                                         const Vec3<FloatPacket> &p, const FloatPacket &y,
+                                         FloatPacket *density) {
+    return sample_one(scene, emitter, choices.weight, p, choices.x, y, density);
 }
 
 bool needs_light_numbers(const PreparedScene &scene) {

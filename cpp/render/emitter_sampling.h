@@ -36,9 +36,12 @@ struct EmitterChoices {
 };
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x);
 
+// `density`, if given, is set where there is light: per solid angle at p, the choice of the
+// emitter included; infinity for light that comes from one direction.
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
                                          const EmitterChoices &choices,
-                                         const Vec3<FloatPacket> &p, const FloatPacket &y);
+                                         const Vec3<FloatPacket> &p, const FloatPacket &y,
+                                         FloatPacket *density = nullptr);
 
 // Whether the numbers x and y make a difference.
 bool needs_light_numbers(const PreparedScene &scene);

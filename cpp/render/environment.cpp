@@ -11,6 +11,9 @@ namespace {
 constexpr float PI = std::numbers::pi_v<float>;
 constexpr float INVERSE_PI = std::numbers::inv_pi_v<float>;
 constexpr float INVERSE_TWO_PI = 0.5f * INVERSE_PI;
+constexpr float EVERYWHERE = 0.25f * INVERSE_PI; // uniform density over the sphere
+// Of the sine of a pole's angle, as in Mitsuba.
+constexpr float SMALLEST_SINE = 0x1p-24f;
 
 // Relative luminance of linear sRGB, as Mitsuba rounds its weights (ITU-R BT.709).
 float luminance(const float *rgb) {
@@ -43,6 +46,15 @@ Vec3<FloatPacket> uniform_direction(const FloatPacket &x, const FloatPacket &y) 
     const FloatPacket r = square_root(maximum(fused(-z, z, one), FloatPacket(0.0f)));
     const FloatPacket angle = FloatPacket(2 * PI) * x;
     return {r * cosine(angle), r * sine(angle), z};
+}
+
+// Longitude and latitude of a direction in the frame of the emitter, in whole turns and
+// half turns.
+Vec2<FloatPacket> place_of(const Vec3<FloatPacket> &d) {
+    const FloatPacket one(1.0f);
+    const FloatPacket height = minimum(maximum(d.y, -one), one);
+    return {arc_tangent(d.x, -d.z) * FloatPacket(INVERSE_TWO_PI),
+            arc_cosine(height) * FloatPacket(INVERSE_PI)};
 }
 
 } // namespace
@@ -132,19 +144,17 @@ Vec3<FloatPacket> Environment::look_up(const FloatPacket &u, const FloatPacket &
 Vec3<FloatPacket> Environment::radiance(const Vec3<FloatPacket> &direction) const {
     if (width_ == 0)
         return in_all_lanes(radiance_);
-    const Vec3<FloatPacket> d = transform(to_local_, normalize(direction));
-    const FloatPacket one(1.0f);
-    const FloatPacket height = minimum(maximum(d.y, -one), one);
-    return look_up(arc_tangent(d.x, -d.z) * FloatPacket(INVERSE_TWO_PI),
-                   arc_cosine(height) * FloatPacket(INVERSE_PI));
+    const Vec2<FloatPacket> at = place_of(transform(to_local_, normalize(direction)));
+    return look_up(at.x, at.y);
 }
 
 Environment::Samples Environment::sample(const FloatPacket &x, const FloatPacket &y) const {
     const FloatPacket zero(0.0f);
     if (width_ == 0)
-        return {uniform_direction(x, y), in_all_lanes(radiance_ * (4 * PI))};
+        return {uniform_direction(x, y), in_all_lanes(radiance_ * (4 * PI)),
+                FloatPacket(EVERYWHERE)};
     if (warp_.empty())
-        return {in_all_lanes({0, 1, 0}), in_all_lanes({})};
+        return {in_all_lanes({0, 1, 0}), in_all_lanes({}), zero};
 
     const auto [point, density] = warp_.sample(x, y);
     // The grid's columns begin in the middle of the first pixel.
@@ -154,15 +164,30 @@ Environment::Samples Environment::sample(const FloatPacket &x, const FloatPacket
     const Vec3<FloatPacket> local = {sine(phi) * sin_theta, cosine(theta),
                                      -cosine(phi) * sin_theta};
     const FloatPacket inverse_sine =
-        FloatPacket(1.0f) / maximum(sin_theta, FloatPacket(0x1p-24f));
+        FloatPacket(1.0f) / maximum(sin_theta, FloatPacket(SMALLEST_SINE));
     const FloatPacket per_solid_angle =
         density * inverse_sine * FloatPacket(1.0f / (2 * (PI * PI)));
     const Vec3<FloatPacket> light = look_up(u, point.y);
     Samples samples;
+    samples.density = per_solid_angle;
     samples.direction = transform(to_world_, local);
     for (int k = 0; k < 3; ++k)
         samples.weight[k] = select(density > zero, light[k] / per_solid_angle, zero);
     return samples;
+}
+
+FloatPacket Environment::density(const Vec3<FloatPacket> &direction) const {
+    if (width_ == 0)
+        return FloatPacket(EVERYWHERE);
+    if (warp_.empty())
+        return FloatPacket(0.0f);
+    const Vec3<FloatPacket> d = transform(to_local_, direction);
+    const Vec2<FloatPacket> at = place_of(d);
+    const FloatPacket u = at.x - FloatPacket(0.5f / float(width_));
+    const FloatPacket sine_2 =
+        maximum(fused(d.x, d.x, d.z * d.z), FloatPacket(SMALLEST_SINE * SMALLEST_SINE));
+    return warp_.density({u - floor(u), at.y}) / square_root(sine_2) *
+           FloatPacket(1.0f / (2 * (PI * PI)));
 }
 
 } // namespace mlrt

@@ -28,10 +28,15 @@ public:
     struct Samples {
         Vec3<FloatPacket> direction;
         Vec3<FloatPacket> weight; // radiance over density per solid angle; 0: no light
+        FloatPacket density;
     };
 
     // x and y are uniform in [0, 1); the same numbers give the same sample in Mitsuba.
     Samples sample(const FloatPacket &x, const FloatPacket &y) const;
+
+    // The density per solid angle with which sample() takes directions, which have unit
+    // length.
+    FloatPacket density(const Vec3<FloatPacket> &direction) const;
 
 private:
     Vec3<FloatPacket> look_up(const FloatPacket &u, const FloatPacket &v) const;

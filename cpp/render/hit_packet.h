@@ -2,7 +2,9 @@
 #pragma once
 
 #include "base/simd.h"
+#include "render/emitter_sampling.h"
 #include "render/prepared_scene.h"
+#include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
 #include "render/surface.h"
 
@@ -22,11 +24,42 @@ struct HitPacket {
     UIntPacket instances;
 };
 
+inline LaneBits not_black(const Vec3<FloatPacket> &colour) {
+    const FloatPacket zero(0.0f);
+    return to_bits((colour.x != zero) | (colour.y != zero) | (colour.z != zero));
+}
+
+// What an array with an entry a ray holds for the packet.
+inline FloatPacket of_rays(const HitPacket &hit, const float *values) {
+    return hit.first ? load<FloatPacket>(values + *hit.first) : gather(values, hit.ray);
+}
+
 // `common_origin`: the rays start where all of the camera's do.
 SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, const HitPacket &hit,
                                      bool common_origin);
 
 // The same for robust shadow rays.
 SurfacePlane<DoublePacket> plane_of(const PreparedScene &scene, const HitPacket &hit);
+
+// The shadow ray from the hits to samples of an emitter.
+inline ShadowSegment<FloatPacket> shadow_segment(const PreparedScene &scene,
+                                                 ShadowOffset offset, const HitPacket &hit,
+                                                 const SurfacePoint<FloatPacket> &point,
+                                                 uint32_t emitter,
+                                                 const EmitterSample<FloatPacket> &light) {
+    if (offset == ShadowOffset::robust)
+        return robust_segment<FloatPacket>(scene, plane_of(scene, hit), emitter, light);
+    return {offset_point(point.p, point.face_normal, light.target - point.p), light.target};
+}
+
+// Where rays begin that leave the surface in the given directions, or pass through it.
+inline Vec3<FloatPacket> onward_start(const PreparedScene &scene, ShadowOffset offset,
+                                      const HitPacket &hit,
+                                      const SurfacePoint<FloatPacket> &point,
+                                      const Vec3<FloatPacket> &direction) {
+    return offset == ShadowOffset::robust
+               ? robust_passage<FloatPacket>(plane_of(scene, hit), direction)
+               : offset_point(point.p, point.face_normal, direction);
+}
 
 } // namespace mlrt

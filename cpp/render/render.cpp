@@ -93,6 +93,7 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     for (const std::unique_ptr<TileRenderer> &tile : idle_tiles) {
         result.counters.primary += tile->counters().primary;
         result.counters.shadow += tile->counters().shadow;
+        result.counters.bsdf += tile->counters().bsdf;
     }
     return parallel_for(picture.rows_to_finish(),
                         [&](uint32_t row) { picture.finish_row(row); });

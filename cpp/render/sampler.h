@@ -111,8 +111,8 @@ private:
     uint32_t samples_per_pixel_, samples_per_pass_;
 };
 
-// Where two numbers in [0, 1) of each sample go; nowhere if x is null: what is drawn is one
-// number then, and dropped.
+// Where two numbers in [0, 1) of each sample go. Without y a single number is drawn, and
+// dropped if x is null too.
 struct NumberPair {
     float *x = nullptr, *y = nullptr;
 };
@@ -134,7 +134,7 @@ inline void draw_numbers(const uint32_t *__restrict seeds,
         }
         return;
     }
-    if (pairs.size() == 2 && pairs[1].x) {
+    if (pairs.size() == 2 && pairs[1].y) {
         float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
         float *__restrict x1 = pairs[1].x, *__restrict y1 = pairs[1].y;
         for (size_t i = 0; i < count; ++i) {
@@ -150,10 +150,10 @@ inline void draw_numbers(const uint32_t *__restrict seeds,
         Pcg32 random = open(i);
         for (const NumberPair &pair : pairs) {
             const float first = random.next_float();
-            if (!pair.x)
-                continue;
-            pair.x[i] = first;
-            pair.y[i] = random.next_float();
+            if (pair.x)
+                pair.x[i] = first;
+            if (pair.y)
+                pair.y[i] = random.next_float();
         }
     }
 }

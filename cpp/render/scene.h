@@ -36,6 +36,7 @@ struct Material {
     // Indices into SceneData::textures: in place of the colours, and the share of the light
     // that is reflected at all (Mitsuba's `mask`).
     uint32_t front_texture = NONE, back_texture = NONE, opacity = NONE;
+    bool passes = false; // all light goes straight through: Mitsuba's `null`
 
     bool is_textured() const {
         return front_texture != NONE || back_texture != NONE || opacity != NONE;
@@ -47,6 +48,12 @@ enum class EmitterType : uint32_t { point, spot, directional, area, constant, en
 // Whether the light comes from all around the scene; one emitter at most does.
 constexpr bool is_environment(EmitterType type) {
     return type == EmitterType::constant || type == EmitterType::envmap;
+}
+
+// Whether the light comes to each point from one direction, which no ray meets by chance.
+constexpr bool has_one_direction(EmitterType type) {
+    return type == EmitterType::point || type == EmitterType::spot ||
+           type == EmitterType::directional;
 }
 
 // Light sources in the order of their declaration, which emitter sampling depends on.

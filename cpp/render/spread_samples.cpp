@@ -133,16 +133,24 @@ bool is_prime(uint32_t number) {
     return number > 1;
 }
 
-// What Mitsuba draws one number with, where nobody wants it.
-void drop_number(Sample &sample) {
-    ++sample.dimension;
-    sample.within_cell();
+// A number on its own, from as many cells as there are samples; `factor` makes the seed.
+float stratified_number(Sample &sample, uint32_t factor) {
+    const uint32_t seed = (sample.pixel_seed + sample.dimension++) * factor;
+    const uint32_t cell = permute(sample.number, sample.count, seed);
+    const float within = sample.within_cell();
+    return (float(cell) + within) * (1.0f / float(sample.count));
 }
 
-template <typename DrawPair>
+float low_discrepancy_number(Sample &sample) {
+    const uint32_t seed = sample.pixel_seed + sample.dimension++;
+    const uint32_t number = permute_by_exchanges(sample.number, sample.count, seed);
+    return van_der_corput(number, sample_tea_32(sample.pixel_seed, 0x48bc48ebu).first);
+}
+
+template <typename DrawPair, typename DrawNumber>
 void for_each_sample(const Sampler &sampler, const uint32_t *seeds, const uint32_t *indices,
                      size_t count, uint32_t samples, std::span<const NumberPair> pairs,
-                     DrawPair &&draw_pair) {
+                     DrawPair &&draw_pair, DrawNumber &&draw_number) {
     for (size_t i = 0; i < count; ++i) {
         const uint32_t number = indices[i] % samples, first = indices[i] - number;
         const uint32_t own_seed = seeds[i] - sampler.base_seed;
@@ -153,8 +161,10 @@ void for_each_sample(const Sampler &sampler, const uint32_t *seeds, const uint32
                       .random = SampleStreams::Stream{seeds[i], indices[i]}.open(),
                       .jitter = sampler.jitter};
         for (const NumberPair &pair : pairs) {
-            if (!pair.x) {
-                drop_number(sample);
+            if (!pair.y) {
+                const float number_alone = draw_number(sample);
+                if (pair.x)
+                    pair.x[i] = number_alone;
                 continue;
             }
             const Vec2f numbers = draw_pair(sample);
@@ -187,42 +197,57 @@ bool takes(SamplerType type, uint32_t samples) {
 void draw_spread_numbers(const Sampler &sampler, const uint32_t *seeds,
                          const uint32_t *indices, size_t count, uint32_t samples,
                          std::span<const NumberPair> pairs) {
-    const auto draw = [&](auto &&draw_pair) {
-        for_each_sample(sampler, seeds, indices, count, samples, pairs, draw_pair);
+    const auto draw = [&](auto &&draw_pair, auto &&draw_number) {
+        for_each_sample(sampler, seeds, indices, count, samples, pairs, draw_pair,
+                        draw_number);
     };
     switch (sampler.type) {
-    case SamplerType::independent:
-        draw([](Sample &sample) -> Vec2f {
-            const float x = sample.random.next_float();
-            return {x, sample.random.next_float()};
-        });
+    case SamplerType::independent: {
+        const auto number = [](Sample &sample) { return sample.random.next_float(); };
+        draw(
+            [&](Sample &sample) -> Vec2f {
+                const float x = number(sample);
+                return {x, number(sample)};
+            },
+            number);
         break;
+    }
     case SamplerType::stratified:
-        draw([side = square_side(samples)](Sample &sample) {
-            return stratified_pair(sample, side);
-        });
+        draw([side = square_side(samples)](
+                 Sample &sample) { return stratified_pair(sample, side); },
+             [](Sample &sample) { return stratified_number(sample, 1); });
         break;
     case SamplerType::multijitter: {
         const uint32_t rows = grid_rows(samples);
-        draw([rows, columns = samples / rows](Sample &sample) {
-            return multijittered_pair(sample, columns, rows);
-        });
+        draw([rows, columns = samples / rows](
+                 Sample &sample) { return multijittered_pair(sample, columns, rows); },
+             [](Sample &sample) { return stratified_number(sample, 0x45fbe943u); });
         break;
     }
-    case SamplerType::orthogonal:
-        draw([side = square_side(samples)](Sample &sample) -> Vec2f {
-            const float x = orthogonal_number(sample, side);
-            return {x, orthogonal_number(sample, side)};
-        });
+    case SamplerType::orthogonal: {
+        const auto number = [side = square_side(samples)](Sample &sample) {
+            return orthogonal_number(sample, side);
+        };
+        draw(
+            [&](Sample &sample) -> Vec2f {
+                const float x = number(sample);
+                return {x, number(sample)};
+            },
+            number);
         break;
+    }
     case SamplerType::ldsampler:
-        draw([](Sample &sample) -> Vec2f {
-            const uint32_t seed = sample.pixel_seed + sample.dimension++;
-            const uint32_t number = permute_by_exchanges(sample.number, sample.count, seed);
-            const auto [scramble_x, scramble_y] =
-                sample_tea_32(sample.pixel_seed, 0x98bc51abu);
-            return {van_der_corput(number, scramble_x), sobol_second(number, scramble_y)};
-        });
+        draw(
+            [](Sample &sample) -> Vec2f {
+                const uint32_t seed = sample.pixel_seed + sample.dimension++;
+                const uint32_t number =
+                    permute_by_exchanges(sample.number, sample.count, seed);
+                const auto [scramble_x, scramble_y] =
+                    sample_tea_32(sample.pixel_seed, 0x98bc51abu);
+                return {van_der_corput(number, scramble_x),
+                        sobol_second(number, scramble_y)};
+            },
+            low_discrepancy_number);
         break;
     }
 }

@@ -34,10 +34,9 @@ float facing(const Shape &shape) {
 template <typename Real, typename Corner>
 Vec3<Real> interpolate(const Corners<Corner> &v, const Real &wa, const Real &wb,
                        const Real &wc) {
-    Vec3<Real> mean;
-    for (int k = 0; k < 3; ++k)
-        mean[k] = fused(Real(v.a[k]), wa, fused(Real(v.b[k]), wb, Real(v.c[k]) * wc));
-    return mean;
+    return by_axis([&](int k) {
+        return fused(Real(v.a[k]), wa, fused(Real(v.b[k]), wb, Real(v.c[k]) * wc));
+    });
 }
 
 // In double precision, where the product of tiny edges does not vanish.
@@ -53,12 +52,9 @@ Vec3<Real> face_normal_of(const Corners<Real> &corners) {
 // compute_surface_interaction). Corner is float if all rays meet the same face.
 template <typename Real, typename Corner>
 SurfacePoint<Real> on_face(const Vec2<Real> &at, const Corners<Corner> &corners) {
-    SurfacePoint<Real> point;
     const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
-    point.p = interpolate<Real>(corners, w0, w1, w2);
-    point.face_normal = Vec3<Real>(face_normal_of(corners));
-    point.shading_normal = point.face_normal;
-    return point;
+    const auto normal = Vec3<Real>(face_normal_of(corners));
+    return {interpolate<Real>(corners, w0, w1, w2), normal, normal};
 }
 
 template <typename Real, typename Corner>
@@ -69,10 +65,7 @@ Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Corner> &n,
     // Opposite vertex normals can cancel; the face normal is then as good as any.
     const MaskOf<Real> has_direction = dot(mean, mean) > Real(0.0f);
     const Vec3<Real> unit = normalize(mean);
-    Vec3<Real> normal;
-    for (int k = 0; k < 3; ++k)
-        normal[k] = select(has_direction, unit[k], face_normal[k]);
-    return normal;
+    return by_axis([&](int k) { return select(has_direction, unit[k], face_normal[k]); });
 }
 
 template <typename Real>
@@ -179,21 +172,20 @@ hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
     // Neighbours mostly meet the same few faces, which are then read once, and whose part
     // of the work is done once if the origin is the same too.
     constexpr uint32_t FEW = 4; // chosen
-    SurfacePoint<FloatPacket> point;
-    LaneBits left = lanes;
-    for (uint32_t n = 0; n < FEW && left != 0; ++n) {
-        const uint32_t face = lane_of(faces, uint32_t(__builtin_ctz(left)));
+    const auto first_of = [&](LaneBits left) {
+        return lane_of(faces, uint32_t(__builtin_ctz(left)));
+    };
+    uint32_t face = first_of(lanes);
+    SurfacePoint<FloatPacket> point = on_one_face(scene, origin, direction, face);
+    LaneBits left = lanes & ~to_bits(faces == UIntPacket(face));
+    for (uint32_t n = 1; n < FEW && left != 0; ++n) {
+        face = first_of(left);
         const LaneBits served = left & to_bits(faces == UIntPacket(face));
-        const SurfacePoint<FloatPacket> part = on_one_face(scene, origin, direction, face);
-        if (n == 0)
-            point = part;
-        else
-            replace(point, served, part);
+        replace(point, served, on_one_face(scene, origin, direction, face));
         left &= ~served;
     }
-    if (left != 0) {
+    if (left != 0)
         replace(point, left, on_faces(scene, origin, direction, faces_in(faces, left)));
-    }
     return point;
 }
 

@@ -36,26 +36,29 @@ LightPoint<FloatPacket> sample_textured_light(const PreparedScene &scene, uint32
     return point;
 }
 
-Vec3<FloatPacket> emitted_radiance(const PreparedScene &scene, uint32_t emitter,
-                                   const ShadedRays &rays, LaneBits lanes) {
+Emission emission_of(const PreparedScene &scene, uint32_t emitter, const ShadedRays &rays,
+                     LaneBits lanes) {
     const Emitter &light = scene.data.emitters[emitter];
+    const EmitterTable &table = scene.emitter_tables[emitter];
     if (light.radiance_texture == NONE)
-        return in_all_lanes(light.radiance);
+        return {in_all_lanes(light.radiance), FloatPacket(table.inverse_area)};
     const Shape &shape = scene.data.shapes[light.shape];
     const FaceNumbers faces = faces_in(rays.faces, lanes);
     const Vec2<FloatPacket> weights =
         barycentrics_of(rays.origin, rays.direction, corners_of(scene, faces));
     const LaneArray<float> b = to_lanes<float>(weights.x), c = to_lanes<float>(weights.y);
-    LaneArray<float> radiance[3] = {};
+    LaneArray<float> radiance[3] = {}, density = {};
     for_each_lane(lanes, [&](uint32_t lane) {
         const TexturePoint at =
             texture_point(scene.data, shape, faces[lane], b[lane], c[lane]);
         const Vec3f value = evaluate(scene.data.textures, light.radiance_texture, at);
         for (int k = 0; k < 3; ++k)
             radiance[k][lane] = value[k];
+        density[lane] = table.texture.density(at.uv) * table.inverse_area;
     });
-    return {load<FloatPacket>(radiance[0]), load<FloatPacket>(radiance[1]),
-            load<FloatPacket>(radiance[2])};
+    return {{load<FloatPacket>(radiance[0]), load<FloatPacket>(radiance[1]),
+             load<FloatPacket>(radiance[2])},
+            load<FloatPacket>(density)};
 }
 
 } // namespace mlrt

@@ -22,9 +22,13 @@ LightPoint<float> sample_textured_light(const PreparedScene &scene, uint32_t emi
 LightPoint<FloatPacket> sample_textured_light(const PreparedScene &scene, uint32_t emitter,
                                               const FloatPacket &x, const FloatPacket &y);
 
-// What any area light emits where the given lanes meet it, of which there must be one; any
-// value in others.
-Vec3<FloatPacket> emitted_radiance(const PreparedScene &scene, uint32_t emitter,
-                                   const ShadedRays &rays, LaneBits lanes);
+// What any area light emits where the given lanes meet it, of which there must be one, and
+// how densely emitter samples of it lie there, per area; any values in other lanes.
+struct Emission {
+    Vec3<FloatPacket> radiance;
+    FloatPacket density;
+};
+Emission emission_of(const PreparedScene &scene, uint32_t emitter, const ShadedRays &rays,
+                     LaneBits lanes);
 
 } // namespace mlrt

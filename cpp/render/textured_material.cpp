@@ -32,46 +32,88 @@ namespace {
 Vec3f reflectance(const SceneData &scene, const Material &material, bool front,
                   const TexturePoint &at) {
     const uint32_t texture = front ? material.front_texture : material.back_texture;
-    Vec3f colour = front ? material.front : material.back;
-    if (texture != NONE)
-        colour = evaluate(scene.textures, texture, at);
-    if (material.opacity != NONE)
-        colour = colour *
-                 std::clamp(evaluate(scene.textures, material.opacity, at).x, 0.0f, 1.0f);
-    return colour;
+    return texture != NONE ? evaluate(scene.textures, texture, at)
+           : front         ? material.front
+                           : material.back;
 }
 
-} // namespace
+float opacity_of(const SceneData &scene, const Material &material, const TexturePoint &at) {
+    return std::clamp(evaluate(scene.textures, material.opacity, at).x, 0.0f, 1.0f);
+}
 
-Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &rays,
-                                  LaneBits lanes, LaneBits seen_from_front,
-                                  Vec3<FloatPacket> albedo) {
+// Calls visit(lane, material, front, at) for the given lanes whose shape has a textured
+// material; returns whether any has.
+template <typename Visit>
+bool for_each_textured_lane(const PreparedScene &scene, const ShadedRays &rays,
+                            LaneBits lanes, LaneBits seen_from_front, Visit &&visit) {
     LaneBits textured = 0;
     for_each_value(rays.shapes, lanes, [&](uint32_t shape, LaneBits holders) {
         if (scene.shape_materials[shape].is_textured())
             textured |= holders;
     });
     if (textured == 0)
-        return albedo;
+        return false;
     const FaceNumbers numbers = faces_in(rays.faces, textured);
     const Vec2<FloatPacket> weights =
         barycentrics_of(rays.origin, rays.direction, corners_of(scene, numbers));
     const LaneArray<float> b = to_lanes<float>(weights.x), c = to_lanes<float>(weights.y);
-    LaneArray<float> colours[3];
-    for (int k = 0; k < 3; ++k)
-        colours[k] = to_lanes<float>(albedo[k]);
     for_each_lane(textured, [&](uint32_t lane) {
         const uint32_t face = numbers[lane], shape = scene.shape_of_face[face];
-        const TexturePoint at =
-            texture_point(scene.data, scene.data.shapes[shape], face, b[lane], c[lane]);
-        const Vec3f colour = reflectance(scene.data, scene.shape_materials[shape],
-                                         ((seen_from_front >> lane) & 1u) != 0, at);
-        for (int k = 0; k < 3; ++k)
-            colours[k][lane] = colour[k];
+        visit(lane, scene.shape_materials[shape], ((seen_from_front >> lane) & 1u) != 0,
+              texture_point(scene.data, scene.data.shapes[shape], face, b[lane], c[lane]));
     });
-    for (int k = 0; k < 3; ++k)
-        albedo[k] = load<FloatPacket>(colours[k]);
-    return albedo;
+    return true;
+}
+
+struct ColourLanes {
+    LaneArray<float> of[3];
+
+    explicit ColourLanes(const Vec3<FloatPacket> &colour)
+        : of{to_lanes<float>(colour.x), to_lanes<float>(colour.y),
+             to_lanes<float>(colour.z)} {}
+    void set(uint32_t lane, Vec3f colour) {
+        for (int k = 0; k < 3; ++k)
+            of[k][lane] = colour[k];
+    }
+    Vec3<FloatPacket> packet() const {
+        return {load<FloatPacket>(of[0]), load<FloatPacket>(of[1]),
+                load<FloatPacket>(of[2])};
+    }
+};
+
+} // namespace
+
+Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &rays,
+                                  LaneBits lanes, LaneBits seen_from_front,
+                                  Vec3<FloatPacket> albedo) {
+    ColourLanes colours(albedo);
+    const bool any = for_each_textured_lane(
+        scene, rays, lanes, seen_from_front,
+        [&](uint32_t lane, const Material &material, bool front, const TexturePoint &at) {
+            Vec3f colour = reflectance(scene.data, material, front, at);
+            if (material.opacity != NONE)
+                colour = colour * opacity_of(scene.data, material, at);
+            colours.set(lane, colour);
+        });
+    return any ? colours.packet() : albedo;
+}
+
+void add_textures(const PreparedScene &scene, const ShadedRays &rays, LaneBits lanes,
+                  LaneBits seen_from_front, Vec3<FloatPacket> &albedo,
+                  FloatPacket &opacity) {
+    ColourLanes colours(albedo);
+    LaneArray<float> shares = to_lanes<float>(opacity);
+    const bool any = for_each_textured_lane(
+        scene, rays, lanes, seen_from_front,
+        [&](uint32_t lane, const Material &material, bool front, const TexturePoint &at) {
+            colours.set(lane, reflectance(scene.data, material, front, at));
+            if (material.opacity != NONE)
+                shares[lane] = opacity_of(scene.data, material, at);
+        });
+    if (!any)
+        return;
+    albedo = colours.packet();
+    opacity = load<FloatPacket>(shares);
 }
 
 } // namespace mlrt

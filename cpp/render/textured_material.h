@@ -24,4 +24,10 @@ Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &
                                   LaneBits lanes, LaneBits seen_from_front,
                                   Vec3<FloatPacket> albedo);
 
+// The same, with what is not reflected apart: `albedo` of the share that is, and that
+// share.
+void add_textures(const PreparedScene &scene, const ShadedRays &rays, LaneBits lanes,
+                  LaneBits seen_from_front, Vec3<FloatPacket> &albedo,
+                  FloatPacket &opacity);
+
 } // namespace mlrt

@@ -1,13 +1,13 @@
 #include "render/tile.h"
 
 #include "objects/trace_objects.h"
+#include "render/emitter_density.h"
 #include "render/emitter_sampling.h"
-#include "render/shadow_offset.h"
-#include "render/shadow_segment.h"
 #include "render/textured_light.h"
 #include "render/textured_material.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -16,19 +16,13 @@ namespace mlrt {
 
 namespace {
 
-LaneBits not_black(const Vec3<FloatPacket> &colour) {
-    const FloatPacket zero(0.0f);
-    return to_bits((colour.x != zero) | (colour.y != zero) | (colour.z != zero));
-}
-
 UIntPacket shapes_of(const PreparedScene &scene, const UIntPacket &faces, LaneBits lanes) {
-    LaneArray<uint32_t> shapes;
-    shapes.fill(NONE);
+    UIntPacket shapes(NONE);
     for_each_value(faces, lanes, [&](uint32_t face, LaneBits holders) {
-        const uint32_t shape = scene.shape_of_face[face];
-        for_each_lane(holders, [&](uint32_t lane) { shapes[lane] = shape; });
+        shapes = select(from_bits<UIntPacket>(holders),
+                        UIntPacket(scene.shape_of_face[face]), shapes);
     });
-    return load<UIntPacket>(shapes);
+    return shapes;
 }
 
 // What the sides that the rays see reflect; black in other lanes.
@@ -55,13 +49,27 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
                            ShadowOffset offset, TileTarget target)
     : scene_(scene), streams_(streams),
       // One is as good as many where the numbers make no difference.
-      emitter_samples_(needs_light_numbers(scene) ? sampling.emitter_samples : 1),
+      emitter_samples_(needs_light_numbers(scene) ? sampling.emitter_samples
+                                                  : std::min(1u, sampling.emitter_samples)),
       options_(options), offset_(offset), target_(target),
       samples_(scene, streams, sampling.sampler, target.film.sampled(),
                {target.film.needs_positions(),
-                needs_light_numbers(scene) ? sampling.emitter_samples : 0}) {
-    for (uint32_t emitter = 0; emitter < scene.data.emitters.size(); ++emitter)
+                needs_light_numbers(scene) ? sampling.emitter_samples : 0,
+                emitters_can_be_hit(scene) ? sampling.bsdf_samples : 0}),
+      shares_(sampling.emitter_samples, sampling.bsdf_samples),
+      bsdf_samples_(emitters_can_be_hit(scene) ? sampling.bsdf_samples : 0) {
+    for (uint32_t emitter = 0; emitter < scene.data.emitters.size(); ++emitter) {
         shadows_.emplace_back(scene, emitter, offset);
+        // Mitsuba 3.9's direct.cpp does not divide light that comes from one direction by
+        // the number of samples.
+        const float shared_by =
+            has_one_direction(scene.data.emitters[emitter].type)
+                ? float(emitter_samples_) / float(sampling.emitter_samples)
+                : float(emitter_samples_);
+        factors_.push_back(std::numbers::inv_pi_v<float> / shared_by);
+    }
+    if (bsdf_samples_ > 0)
+        bsdf_rays_.emplace(scene, shares_);
 }
 
 void TileRenderer::render(const PixelGroup &group) {
@@ -91,6 +99,8 @@ void TileRenderer::make_room() {
         cost_.assign(padded, 0.0f);
     for (ShadowRays &shadow : shadows_)
         shadow.clear();
+    if (bsdf_rays_)
+        bsdf_rays_->clear();
 }
 
 void TileRenderer::trace_camera_rays(const PixelGroup &group) {
@@ -190,9 +200,9 @@ void TileRenderer::write_depth_and_normal(const HitPacket &hit,
         set(channels.normal + k, point.shading_normal[k]);
 }
 
-// Mitsuba's direct.cpp without BSDF samples: light that the surface emits, and shadow rays
-// for light that it reflects. A ray that contributes nothing, however its shadow ray fares,
-// is left out as soon as that is known.
+// Mitsuba's direct.cpp, for BSDF samples see bsdf_light.cpp: light that the surface emits,
+// and shadow rays for light that it reflects. A ray that contributes nothing, however its
+// shadow ray fares, is left out as soon as that is known.
 void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point) {
     const FloatPacket zero(0.0f);
     // Only its sign matters, so the direction need not have unit length.
@@ -203,6 +213,10 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
     LaneBits lanes =
         add_emission(hit, point, shapes, seen_from_front) & to_bits(cos_view != zero);
     Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
+    if (bsdf_rays_) {
+        shade_in_both_ways(hit, point, shapes, lanes, cos_view, albedo);
+        return;
+    }
     if (scene_.any_material_is_textured)
         albedo = textured_albedo(scene_, {hit.origin, hit.direction, hit.faces, shapes},
                                  lanes, seen_from_front, albedo);
@@ -217,13 +231,8 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
                                       const SurfacePoint<FloatPacket> &point,
                                       LaneBits lanes, const FloatPacket &cos_view,
                                       const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const auto numbers = [&](const float *of_rays) {
-        return hit.first ? load<FloatPacket>(of_rays + *hit.first)
-                         : gather(of_rays, hit.ray);
-    };
-    const FloatPacket zero(0.0f), x = numbers(samples_.light_x(sample));
-    const FloatPacket y = numbers(samples_.light_y(sample));
-    const float part = std::numbers::inv_pi_v<float> / float(emitter_samples_);
+    const FloatPacket zero(0.0f), x = of_rays(hit, samples_.light_x(sample));
+    const FloatPacket y = of_rays(hit, samples_.light_y(sample));
     const EmitterChoices choices = choose_emitters(scene_, x);
     for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits lit) {
         const EmitterSample<FloatPacket> light =
@@ -233,15 +242,9 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
         lit &= not_black(light.weight) & to_bits(cos_light > zero);
         if (lit == 0)
             return;
-        ShadowSegment<FloatPacket> segment;
-        if (offset_ == ShadowOffset::robust) {
-            segment =
-                robust_segment<FloatPacket>(scene_, plane_of(scene_, hit), emitter, light);
-        } else {
-            segment = {offset_point(point.p, point.face_normal, light.target - point.p),
-                       light.target};
-        }
-        const FloatPacket share = FloatPacket(part) * cos_light;
+        const ShadowSegment<FloatPacket> segment =
+            shadow_segment(scene_, offset_, hit, point, emitter, light);
+        const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
         shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
                                  (albedo * share) * light.weight);
     });
@@ -267,8 +270,9 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
         const LaneBits lit = holders & seen_from_front;
         if (lit == 0)
             return;
-        const Vec3<FloatPacket> radiance = emitted_radiance(
-            scene_, number, {hit.origin, hit.direction, hit.faces, shapes}, lit);
+        const Vec3<FloatPacket> radiance =
+            emission_of(scene_, number, {hit.origin, hit.direction, hit.faces, shapes}, lit)
+                .radiance;
         for_each_lane(lit, [&](uint32_t lane) {
             for (int k = 0; k < 3; ++k)
                 values_[size_t(k)][rays[lane]] += radiance[k].entry(lane);
@@ -276,9 +280,7 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     });
     if (hidden != 0) {
         const Vec3<FloatPacket> start =
-            offset_ == ShadowOffset::robust
-                ? robust_passage<FloatPacket>(plane_of(scene_, hit), hit.direction)
-                : offset_point(point.p, point.face_normal, hit.direction);
+            onward_start(scene_, offset_, hit, point, hit.direction);
         for_each_lane(hidden, [&](uint32_t lane) {
             passing_.ray.push_back(rays[lane]);
             for (int k = 0; k < 3; ++k)
@@ -366,6 +368,9 @@ void TileRenderer::add_reflected_light() {
                          green[ray] += light.y;
                          blue[ray] += light.z;
                      });
+    if (bsdf_rays_)
+        bsdf_rays_->trace(options_, counters_.bsdf, cost,
+                          std::array<float *, 3>{red, green, blue});
 }
 
 void TileRenderer::write(const PixelGroup &group) {

@@ -5,6 +5,7 @@
 
 #include "base/counters.h"
 #include "mlrta/trace.h"
+#include "render/bsdf_rays.h"
 #include "render/camera_samples.h"
 #include "render/hit_packet.h"
 #include "render/picture_film.h"
@@ -16,6 +17,7 @@
 #include "render/spread_samples.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -52,13 +54,15 @@ struct TileTarget {
 };
 
 struct RenderCounters {
-    Counters primary, shadow;
+    Counters primary, shadow, bsdf;
 };
 
 // How samples are taken.
 struct Sampling {
     Sampler sampler;
-    uint32_t emitter_samples = 1; // of each camera sample
+    // Of each camera sample.
+    uint32_t emitter_samples = 1;
+    uint32_t bsdf_samples = 0;
 };
 
 class TileRenderer {
@@ -91,6 +95,13 @@ private:
     void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             LaneBits lanes, const FloatPacket &cos_view,
                             const Vec3<FloatPacket> &albedo, uint32_t sample);
+    // In bsdf_light.cpp.
+    void shade_in_both_ways(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                            const UIntPacket &shapes, LaneBits lanes,
+                            const FloatPacket &cos_view, const Vec3<FloatPacket> &albedo);
+    void add_weighted_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                             LaneBits lanes, const FloatPacket &cos_view,
+                             const Scattering &scattering, uint32_t sample);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
     void pass_hidden_emitters();
@@ -108,6 +119,7 @@ private:
     const PreparedScene &scene_;
     const SampleStreams &streams_;
     uint32_t emitter_samples_;
+    std::vector<float> factors_; // of the cosine, one an emitter
     TraceOptions options_;
     ShadowOffset offset_;
     TileTarget target_;
@@ -122,6 +134,9 @@ private:
     std::vector<std::vector<float>> values_; // by channel of the film
 
     std::vector<ShadowRays> shadows_; // one an emitter
+    SampleShares shares_;
+    uint32_t bsdf_samples_;
+    std::optional<BsdfRays> bsdf_rays_; // if there are BSDF samples
     PassingRays passing_;
 };
 

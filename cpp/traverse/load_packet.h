@@ -21,9 +21,7 @@ struct LoadedPacket {
 inline FloatPacket load_padded(const float *values, uint32_t first, uint32_t count) {
     if (first + PACKET_WIDTH <= count)
         return load<FloatPacket>(values + first);
-    std::array<float, PACKET_WIDTH> padded{};
-    std::copy(values + first, values + count, padded.begin());
-    return load<FloatPacket>(padded.data());
+    return load_first(values + first, count - first);
 }
 
 template <typename Origin>

@@ -116,7 +116,7 @@ def load_scene(
     if resolution is not None:
         scene_import.set_resolution(parsed, sensor, resolution)
     warnings = [
-        *integrators.integrator_warnings(found, lighting, native=False),
+        *integrators.integrator_warnings(found, lighting),
         *ignored(root, sensor),
     ]
     with captured_warnings() as messages:
@@ -186,7 +186,7 @@ def of_loaded(
             "be changed with Mitsuba's own shading: change it in the scene"
         )
     check_film(eye.film(), str(elements.from_object(eye.film())))
-    warnings = integrators.integrator_warnings(found, lighting, native=False)
+    warnings = integrators.integrator_warnings(found, lighting)
     shapes = list(scene.shapes())
     groups = [
         part

@@ -271,22 +271,9 @@ def test_spectral_objects_are_refused(scalar_variant: None) -> None:
         import_scene(scene)
 
 
-@pytest.mark.parametrize(
-    ("plugin", "name", "value"),
-    [
-        ("direct", "emitter_samples", 0),
-        ("path", "max_depth", 1),
-        ("mlrt", "bsdf_samples", 1),
-        ("mlrt", "samples", 1),
-    ],
-)
-def test_integrators_that_ask_for_something_else(
-    scene_file: SceneFile, plugin: str, name: str, value: int
-) -> None:
-    integrator = (
-        f'<integrator type="{plugin}"><integer name="{name}" value="{value}"/></integrator>'
-    )
-    with pytest.raises(UnsupportedFeature, match="integrator '"):
+def test_integrator_without_such_a_parameter(scene_file: SceneFile) -> None:
+    integrator = '<integrator type="mlrt"><integer name="samples" value="1"/></integrator>'
+    with pytest.raises(UnsupportedFeature, match=r"integrator 'mlrt'.*'samples'"):
         import_scene(scene_file(integrator=integrator))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import scene_files
 
-from mlrt_plugin import UnsupportedFeature, prepare, render
+from mlrt_plugin import SceneError, UnsupportedFeature, prepare, render
 from mlrt_plugin.cli import main
 
 SceneFile = Callable[..., Path]
@@ -69,9 +69,17 @@ def test_parameters(scene_file: SceneFile, scalar_variant: None) -> None:
     assert np.array(mi.render(mi.load_file(str(path)))).max() == 0
     assert render(path).image.max() == 0
     assert render(path, hide_emitters=False).image.max() == 1
-    both = mi.load_dict({"type": "mlrt", "bsdf_samples": 1})
-    with pytest.raises(UnsupportedFeature, match=r"bsdf_samples to 0.*llvm_ad_rgb"):
-        mi.render(mi.load_file(str(path)), integrator=both)
+    none = mi.load_dict({"type": "mlrt", "emitter_samples": 0})
+    with pytest.raises(SceneError, match="one of them must be at least 1"):
+        mi.render(mi.load_file(str(path)), integrator=none)
+    both = mi.load_dict({"type": "mlrt", "emitter_samples": 1, "bsdf_samples": 2})
+    counts = '<integer name="bsdf_samples" value="2"/>'
+    path = scene_file(
+        integrator=f'<integrator type="direct">{counts}</integrator>',
+        emitters='<emitter type="constant"/>',
+    )
+    image = np.array(mi.render(mi.load_file(str(path)), integrator=both))
+    np.testing.assert_array_equal(image, render(path).image)
     with pytest.raises(RuntimeError, match="shading = 'toon' does not exist"):
         mi.load_dict({"type": "mlrt", "shading": "toon"})
     with pytest.raises(RuntimeError, match="unreferenced"):

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import plugin_scenes
 import pytest
 import scene_files
@@ -17,9 +18,8 @@ from mlrt_plugin.shading_choice import choose_shading
 SceneFile = Callable[..., Path]
 
 SHINY = '<shape type="cube"><bsdf type="plastic" id="shiny"/></shape>'
-NO_EMITTER_SAMPLES = (
-    '<integrator type="direct"><integer name="emitter_samples" value="0"/></integrator>'
-)
+GLASS = '<shape type="cube"><bsdf type="dielectric" id="glass"/></shape>'
+GLOWING = '<shape type="rectangle"><emitter type="area"/></shape>'
 
 
 def integrator(plugin: str, tag: str, name: str, value: object) -> str:
@@ -43,10 +43,17 @@ def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
     [
         ({"shapes": SHINY}, r"bsdf 'plastic' with id 'shiny' at .*:21 is not native"),
         ({"shapes": '<shape type="sdfgrid" id="ball"/>'}, "shape 'sdfgrid' with id 'ball'"),
-        ({"integrator": NO_EMITTER_SAMPLES}, "integrator 'direct'.*no emitter samples"),
         (
-            {"integrator": integrator("mlrt", "integer", "bsdf_samples", 2)},
-            "integrator 'mlrt'.*no BSDF sample natively",
+            {
+                "integrator": integrator("direct", "integer", "emitter_samples", 0),
+                "shapes": GLASS,
+                "emitters": GLOWING,
+            },
+            "lights in bsdf 'dielectric' with id 'glass'.*BSDF samples.*'direct'",
+        ),
+        (
+            {"integrator": integrator("mlrt", "integer", "bsdf_samples", 300)},
+            "integrator 'mlrt'.*bsdf_samples = 300, and at most 256 are taken natively",
         ),
         (
             {"integrator": integrator("direct", "integer", "emitter_samples", 257)},
@@ -112,10 +119,32 @@ def test_what_would_be_missing_must_be_allowed(
 def test_paths_of_two_segments_are_direct_light(scene_file: SceneFile) -> None:
     path = scene_file(integrator=integrator("path", "integer", "max_depth", 2))
     assert import_scene(path).warnings == ()
-    for depth, error in ((0, "black"), (1, "no emitter samples")):
-        path = scene_file(integrator=integrator("path", "integer", "max_depth", depth))
-        with pytest.raises(SceneError, match=error):
-            import_scene(path)
+    path = scene_file(integrator=integrator("path", "integer", "max_depth", 0))
+    with pytest.raises(SceneError, match="black"):
+        import_scene(path)
+
+
+def test_paths_of_one_segment_end_at_lights(scene_file: SceneFile) -> None:
+    one = integrator("path", "integer", "max_depth", 1)
+    image = prepare(scene_file(integrator=one, emitters=GLOWING)).render().image
+    assert set(np.unique(image)) == {0.0, 0.5, 1.0}  # of two samples a pixel
+
+
+@pytest.mark.parametrize("counts", [(0, 1), (2, 3), (1, 0)])
+def test_samples_are_told(scene_file: SceneFile, counts: tuple[int, int]) -> None:
+    xml = "".join(
+        f'<integer name="{name}" value="{count}"/>'
+        for name, count in zip(("emitter_samples", "bsdf_samples"), counts, strict=True)
+    )
+    path = scene_file(
+        integrator=f'<integrator type="direct">{xml}</integrator>', emitters=GLOWING
+    )
+    assert choose_shading(path).path == "native"
+    line = f"light samples: {counts[0]} of emitters, {counts[1]} of BSDFs"
+    assert line in scene_report(path)
+    # A lamp is met by no ray.
+    lit = scene_file(integrator=f'<integrator type="direct">{xml}</integrator>')
+    assert f"light samples: {counts[0]} of emitters, 0 of BSDFs" in scene_report(lit)
 
 
 def test_aovs_of_the_scene_are_rendered(scene_file: SceneFile) -> None:

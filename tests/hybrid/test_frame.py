@@ -140,6 +140,7 @@ def test_aovs_are_those_of_mitsuba(assets: Path) -> None:
 
 @pytest.mark.parametrize(("emitter_samples", "bsdf_samples"), [(2, 0), (0, 1), (3, 2)])
 @pytest.mark.parametrize("hide", [False, True])
+@pytest.mark.filterwarnings("ignore:.*its issue 1861")
 def test_samples_are_taken_as_direct_does(
     assets: Path, emitter_samples: int, bsdf_samples: int, hide: bool
 ) -> None:

@@ -221,7 +221,8 @@ BAD_RENDERS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
         ValueError,
         "32 bits",
     ),
-    "no emitter sample": ({"emitter_samples": 0}, ValueError, "from 1 to 256"),
+    "emitter samples": ({"emitter_samples": 257}, ValueError, "at most 256"),
+    "BSDF samples": ({"bsdf_samples": 257}, ValueError, "at most 256"),
 }
 
 

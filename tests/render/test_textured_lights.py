@@ -11,6 +11,7 @@ import texture_scenes
 from mitsuba_worker import MitsubaWorker
 
 import mlrt_plugin
+from mlrt_plugin.scene_arrays import Lighting
 
 SEED, SPP = 5, 4
 ROUNDING = 1e-4
@@ -31,13 +32,19 @@ def scene_path(folder: Path, name: str) -> Path:
     return path
 
 
+@pytest.mark.parametrize("bsdf_samples", [0, 1])
 @pytest.mark.parametrize("name", light_textures.SCENES)
 def test_picture_equals_mitsubas(
-    mitsuba_llvm: MitsubaWorker, assets: Path, name: str
+    mitsuba_llvm: MitsubaWorker, assets: Path, name: str, bsdf_samples: int
 ) -> None:
+    """With BSDF samples, how likely a point of the texture is counts too."""
     path = scene_path(assets, name)
-    expected = mitsuba_llvm("render_file", path=str(path), spp=SPP, seed=SEED)
-    result = mlrt_plugin.render(path, spp=SPP, seed=SEED, shading="native")
+    expected = mitsuba_llvm(
+        "render_file", path=str(path), spp=SPP, seed=SEED, bsdf_samples=bsdf_samples
+    )
+    lighting = Lighting(emitter_samples=1, bsdf_samples=bsdf_samples)
+    prepared = mlrt_plugin.prepare(path, shading="native", lighting=lighting)
+    result = prepared.render(spp=SPP, seed=SEED)
     assert expected.max() > 0.1
     scale = np.maximum(np.abs(expected).max(axis=-1), 1e-3)
     error = np.abs(result.image - expected).max(axis=-1)

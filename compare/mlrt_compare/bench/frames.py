@@ -68,7 +68,8 @@ class FrameBenchmark:
         show_status(f"{name}: loading")
         with thread_count(max(settings.threads)):
             try:
-                self._mlrt, self._mitsuba = MlrtRenderer(wanted), MitsubaRenderer(wanted)
+                self._mlrt = MlrtRenderer(wanted)
+                self._mitsuba = MitsubaRenderer(wanted, self._mlrt.integrator)
             except MlrtError as error:
                 raise BenchError(str(error)) from error
             finally:

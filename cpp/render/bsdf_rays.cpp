@@ -1,0 +1,180 @@
+#include "render/bsdf_rays.h"
+
+#include "objects/trace_objects.h"
+#include "render/emitter_density.h"
+#include "render/hit_packet.h"
+#include "render/textured_light.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+
+namespace mlrt {
+
+SampleShares::SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples) {
+    const float sum = float(emitter_samples + bsdf_samples);
+    emitters = float(emitter_samples) / sum;
+    bsdfs = float(bsdf_samples) / sum;
+    emitter_weight = emitter_samples > 0 ? 1.0f / float(emitter_samples) : 0.0f;
+    bsdf_weight = bsdf_samples > 0 ? 1.0f / float(bsdf_samples) : 0.0f;
+}
+
+void BsdfRays::reserve(size_t size) {
+    if (ray_.size() >= size)
+        return;
+    size = std::max(size, 2 * ray_.size());
+    ray_.resize(size);
+    for (int k = 0; k < 3; ++k)
+        for (std::vector<float> *array : {&start_[k], &p_[k], &direction_[k], &weight_[k]})
+            array->resize(size);
+    density_.resize(size);
+    t_min_.resize(size, 0.0f);
+    t_max_.resize(size, std::numeric_limits<float>::max());
+    primitive_.resize(size);
+    blocked_.resize(size);
+    if (scene_.data.objects) {
+        instance_.resize(size, NO_INSTANCE);
+        t_.resize(size);
+    }
+}
+
+void BsdfRays::append(const BsdfSamples &samples, const UIntPacket &ray,
+                      const Vec3<FloatPacket> &start, const Vec3<FloatPacket> &p) {
+    reserve(count_ + PACKET_WIDTH);
+    store_compressed(&ray_[count_], ray, samples.lanes);
+    for (int k = 0; k < 3; ++k) {
+        store_compressed(&start_[k][count_], start[k], samples.lanes);
+        store_compressed(&p_[k][count_], p[k], samples.lanes);
+        store_compressed(&direction_[k][count_], samples.direction[k], samples.lanes);
+        store_compressed(&weight_[k][count_], samples.weight[k], samples.lanes);
+    }
+    store_compressed(&density_[count_], samples.density, samples.lanes);
+    count_ += uint32_t(std::popcount(samples.lanes));
+}
+
+void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float *cost) {
+    RayGroup rays;
+    rays.count = count_;
+    for (int k = 0; k < 3; ++k) {
+        rays.origin[k] = start_[k].data();
+        rays.direction[k] = direction_[k].data();
+    }
+    rays.t_min = t_min_.data();
+    rays.t_max = t_max_.data();
+    if (cost) {
+        cost_.assign(count_, 0.0f);
+        rays.cost = cost_.data();
+    }
+    const SceneData &scene = scene_.data;
+    if (!scene_.any_shape_glows) {
+        trace_any(*scene.tree, rays, options, blocked_.data(), counters);
+        if (scene.objects)
+            trace_any_objects(*scene.objects, rays, blocked_.data(), counters);
+    } else {
+        float *t = scene.objects ? t_.data() : nullptr;
+        trace_closest(*scene.tree, rays, options, {t, primitive_.data()}, counters);
+        if (scene.objects)
+            trace_closest_objects(*scene.objects, rays,
+                                  {t, primitive_.data(), instance_.data()}, counters);
+    }
+    for (uint32_t i = 0; cost && i < count_; ++i)
+        cost[ray_[i]] += cost_[i];
+}
+
+Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t first) const {
+    return {load<FloatPacket>(&of[0][first]), load<FloatPacket>(&of[1][first]),
+            load<FloatPacket>(&of[2][first])};
+}
+
+Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const {
+    const FloatPacket zero(0.0f);
+    Vec3<FloatPacket> light = in_all_lanes({});
+    LaneArray<uint32_t> emitters, shape_numbers;
+    emitters.fill(NONE);
+    shape_numbers.fill(NONE);
+    HitPacket hit;
+    for_each_lane(hits, [&](uint32_t lane) {
+        const uint32_t shape = scene_.shape_of_face[primitive_[first + lane]];
+        emitters[lane] = scene_.data.shapes[shape].emitter;
+        shape_numbers[lane] = shape;
+        hit.lanes |= LaneBits(emitters[lane] != NONE) << lane;
+    });
+    if (hit.lanes == 0)
+        return light;
+    hit.origin = vector(start_, first);
+    hit.direction = vector(direction_, first);
+    hit.faces = load<UIntPacket>(&primitive_[first]);
+    if (scene_.data.objects) {
+        hit.t = load<FloatPacket>(&t_[first]);
+        hit.instances = load<UIntPacket>(&instance_[first]);
+    }
+    const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
+    const Vec3<FloatPacket> from = vector(p_, first);
+    const UIntPacket shapes = load<UIntPacket>(shape_numbers);
+    const FloatPacket own =
+        load<FloatPacket>(&density_[first]) * FloatPacket(shares_.bsdfs);
+    const LaneBits bright =
+        hit.lanes & to_bits(dot(hit.direction, point.shading_normal) < zero);
+    for_each_value(
+        load<UIntPacket>(emitters), bright, [&](uint32_t emitter, LaneBits lanes) {
+            const Emission emission = emission_of(
+                scene_, emitter, {hit.origin, hit.direction, hit.faces, shapes}, lanes);
+            const FloatPacket other =
+                area_density(scene_, emitter,
+                             {from, point.p, point.shading_normal, emission.density}) *
+                FloatPacket(shares_.emitters);
+            const FloatPacket weight = power_heuristic(own, other);
+            const auto mask = from_bits<FloatPacket>(lanes);
+            for (int k = 0; k < 3; ++k)
+                light[k] = select(mask, weight * emission.radiance[k], light[k]);
+        });
+    return light;
+}
+
+Vec3<FloatPacket> BsdfRays::light_from_around(size_t first, LaneBits misses) const {
+    const Vec3<FloatPacket> direction = vector(direction_, first);
+    const FloatPacket own =
+        load<FloatPacket>(&density_[first]) * FloatPacket(shares_.bsdfs);
+    const FloatPacket other =
+        environment_density(scene_, direction) * FloatPacket(shares_.emitters);
+    const auto mask = from_bits<FloatPacket>(misses);
+    const FloatPacket weight = select(mask, power_heuristic(own, other), FloatPacket(0.0f));
+    const Vec3<FloatPacket> radiance = scene_.environment.radiance(direction);
+    Vec3<FloatPacket> light;
+    for (int k = 0; k < 3; ++k)
+        light[k] = select(mask, weight * radiance[k], FloatPacket(0.0f));
+    return light;
+}
+
+void BsdfRays::trace(const TraceOptions &options, Counters &counters, float *cost,
+                     std::span<float *const, 3> colours) {
+    if (count_ == 0)
+        return;
+    find_hits(options, counters, cost);
+    for (size_t first = 0; first < count_; first += PACKET_WIDTH) {
+        const LaneBits lanes =
+            count_ - first < PACKET_WIDTH ? (1u << (count_ - first)) - 1 : ALL_LANES;
+        LaneBits misses = 0;
+        for_each_lane(lanes, [&](uint32_t lane) {
+            const bool miss = scene_.any_shape_glows
+                                  ? primitive_[first + lane] == NO_PRIMITIVE
+                                  : blocked_[first + lane] == 0;
+            misses |= LaneBits(miss) << lane;
+        });
+        Vec3<FloatPacket> light = in_all_lanes({});
+        if (scene_.any_shape_glows && misses != lanes)
+            light = light_from_shapes(first, lanes & ~misses);
+        if (scene_.environment.exists() && misses != 0)
+            light = light + light_from_around(first, misses);
+        const FloatPacket weight(shares_.bsdf_weight);
+        for (int k = 0; k < 3; ++k) {
+            const LaneArray<float> brought =
+                to_lanes<float>(load<FloatPacket>(&weight_[k][first]) * light[k] * weight);
+            for_each_lane(lanes, [&](uint32_t lane) {
+                colours[size_t(k)][ray_[first + lane]] += brought[lane];
+            });
+        }
+    }
+}
+
+} // namespace mlrt
