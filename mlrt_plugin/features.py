@@ -90,8 +90,8 @@ def reason_against(element: Element) -> str:
             return "lights with a texture are supported on rectangles only so far"
         if element.properties.get("flip_normals", False):
             return "its light has a texture and is turned by flip_normals"
-    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
-        return "textures and masks on it are not supported yet"
+    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_attributes(element):
+        return "textures of the type mesh_attribute are not supported on it yet"
     if plugin == "instance" and element.properties.get("loaded"):
         return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
@@ -121,14 +121,9 @@ def has_textured_light(shape: Element) -> bool:
     )
 
 
-def has_varying_parts(shape: Element) -> bool:
-    """Whether something about a shape, or a group of them, varies over its surface."""
-    return any(
-        part.plugin not in CONSTANT_TEXTURES
-        if part.kind == "texture"
-        else part.kind == "bsdf" and part.plugin == "mask"
-        for part in shape.walk()
-    )
+def has_attributes(shape: Element) -> bool:
+    """Whether a shape, or one of a group, shows what is stored with its mesh."""
+    return any(part.plugin == "mesh_attribute" for part in shape.walk())
 
 
 def shears(to_world: Any) -> bool:

@@ -331,8 +331,9 @@ def collect(
         by_way,
         len(geometry.faces),
         name_of,
-        # Their textures and masks are refused, so that no numbers in the tree count.
+        # Attributes of their meshes are refused, so that no numbers in the tree count.
         lambda shape: materials.add(Surface(shape, name_of(shape), 0, 0), names),
+        lambda row: materials.uses_coordinates()[row],
         geometry.warnings,
         framed,
     )

@@ -121,15 +121,16 @@ def gather_objects(
     first_face: int,
     name_of: Callable[[Any], str],
     material_of: Callable[[Any], int],
+    uses_coordinates: Callable[[int], bool],
     warnings: list[str],
     with_coordinates: bool = False,
 ) -> ObjectArrays | None:
     """Copies what is not in the tree out of loaded shapes; None if there is nothing.
 
     first_face: how many faces the tree has. name_of: what messages call a shape.
-    material_of: the number of a shape's material. warnings: grows by a sentence on each
-    thing that is approximated. with_coordinates: whether the texture coordinates of meshes
-    are needed.
+    material_of: the number of a shape's material. uses_coordinates: whether a material
+    needs texture coordinates. warnings: grows by a sentence on each thing that is
+    approximated. with_coordinates: whether those of all meshes are needed.
 
     Raises SceneError for a shape without an extent and for a mesh that is broken.
     """
@@ -144,9 +145,15 @@ def gather_objects(
         own_names = [name_of(shape) for shape in own]
         geometry = meshes.gather(own, own_names)
         warnings += geometry.warnings
+        rows = [material_of(shape) for shape in own]
         coordinates = gather_coordinates(
-            own, own_names, [False] * len(own), geometry.first_vertices, with_coordinates
+            own,
+            own_names,
+            [uses_coordinates(row) for row in rows],
+            geometry.first_vertices,
+            with_coordinates,
         )
+        warnings += coordinates.warnings
         groups.append(
             GroupArrays(
                 geometry.vertices,
@@ -157,12 +164,12 @@ def gather_objects(
             )
         )
         analytic += [shape for shape in children if is_analytic(shape)]
-        for number, shape in enumerate(own):
+        for number, row in enumerate(rows):
             shapes.append(
                 Shape(
                     first_face=first_face + geometry.first_faces[number],
                     face_count=geometry.face_counts[number],
-                    material=material_of(shape),
+                    material=row,
                     vertex_normals=geometry.vertex_normals[number],
                     flip_normals=geometry.flip_normals[number],
                     texture_coordinates=coordinates.present[number],

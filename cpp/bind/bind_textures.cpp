@@ -160,8 +160,11 @@ void check_textures(const SceneData &scene) {
         const uint32_t light =
             shape.emitter == NONE ? NONE : scene.emitters[shape.emitter].radiance_texture;
         if (is_object(scene, shape)) {
-            if (material.is_textured())
-                refuse_value(name + " has textures, but its faces are not in the tree.");
+            for (const uint32_t texture :
+                 {material.front_texture, material.back_texture, material.opacity})
+                if (texture != NONE && is_attribute(scene, texture))
+                    refuse_value(name + " shows an attribute, but its faces are not in the "
+                                        "tree.");
             continue;
         }
         const bool textured =

@@ -118,7 +118,9 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
     for_each_value(
         load<UIntPacket>(emitters), bright, [&](uint32_t emitter, LaneBits lanes) {
             const Emission emission = emission_of(
-                scene_, emitter, {hit.origin, hit.direction, hit.faces, shapes}, lanes);
+                scene_, emitter,
+                {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
+                lanes);
             const FloatPacket other =
                 area_density(scene_, emitter,
                              {from, point.p, point.shading_normal, emission.density}) *

@@ -218,8 +218,9 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
         return;
     }
     if (scene_.any_material_is_textured)
-        albedo = textured_albedo(scene_, {hit.origin, hit.direction, hit.faces, shapes},
-                                 lanes, seen_from_front, albedo);
+        albedo = textured_albedo(
+            scene_, {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
+            lanes, seen_from_front, albedo);
     lanes &= not_black(albedo);
     if (lanes == 0 || shadows_.empty())
         return;
@@ -271,7 +272,9 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
         if (lit == 0)
             return;
         const Vec3<FloatPacket> radiance =
-            emission_of(scene_, number, {hit.origin, hit.direction, hit.faces, shapes}, lit)
+            emission_of(
+                scene_, number,
+                {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances}, lit)
                 .radiance;
         for_each_lane(lit, [&](uint32_t lane) {
             for (int k = 0; k < 3; ++k)

@@ -43,11 +43,13 @@ def test_approximations_are_named(
 UNSUPPORTED = {
     "sphere": {
         "shapes": '<shape type="sphere" id="ball"><bsdf type="diffuse">'
-        '<texture type="checkerboard" name="reflectance"/></bsdf></shape>'
+        '<texture type="mesh_attribute" name="reflectance">'
+        '<string name="name" value="vertex_color"/></texture></bsdf></shape>'
     },
     "shapegroup": {
         "shapes": '<shape type="shapegroup" id="group"><shape type="cube">'
-        '<bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape></shape>'
+        '<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">'
+        '<string name="name" value="vertex_color"/></texture></bsdf></shape></shape>'
         '<shape type="instance"><ref id="group"/></shape>'
     },
     "spot": {
