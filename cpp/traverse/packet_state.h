@@ -21,7 +21,8 @@ struct PacketHits {
 template <Query query>
 struct PacketState {
     PacketHits hits;
-    LaneBits searching; // active lanes that may still find something
+    LaneBits searching;               // active lanes that may still find something
+    uint32_t occluder = NO_PRIMITIVE; // found last, of Query::any
 
     template <typename Origin>
     explicit PacketState(const RayPacket<Origin> &rays)
@@ -58,6 +59,7 @@ struct PacketState {
         hits.found |= better;
         if constexpr (query == Query::any) {
             searching &= ~better;
+            occluder = primitive;
         } else {
             hits.t = select(from_bits<FloatPacket>(better), candidates.t, hits.t);
             hits.primitive = select(from_bits<UIntPacket>(better), UIntPacket(primitive),
