@@ -142,7 +142,13 @@ def test_attributes_need_faces_of_the_tree(folder: Path) -> None:
         shape["face_count"] for shape in arguments_with(folder, [CONSTANT])["shapes"]
     )
     values = np.ones((count + 1, 3), np.float32)
-    attribute = {"type": "face_attribute", "first": 0, "channels": 3, "texels": values}
+    attribute = {
+        "type": "face_attribute",
+        "first": 0,
+        "channels": 3,
+        "texels": values,
+        "decoded": None,
+    }
     arguments = arguments_with(folder, [attribute])
     ball = {"first_face": count, "face_count": 1, "material": 0}
     arguments["shapes"] = [*arguments["shapes"], ball]
