@@ -177,7 +177,7 @@ nb::tuple closest_hit(const ObjectsHandle &self, const TreeHandle &tree,
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> face(rays.count()), instance(rays.count());
     rays.for_each_group(
-        group_size(rays, trace_options),
+        unordered_group_size(trace_options, rays.count()),
         [&](size_t first, const RayGroup &group, Counters &counters) {
             trace_closest_unordered(*tree.tree, group, trace_options,
                                     {t.data() + first, face.data() + first}, counters);
@@ -206,7 +206,7 @@ nb::object any_hit(const ObjectsHandle &self, const TreeHandle &tree, const Poin
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     std::vector<uint8_t> occluded(rays.count());
-    rays.for_each_group(group_size(rays, trace_options),
+    rays.for_each_group(unordered_group_size(trace_options, rays.count()),
                         [&](size_t first, const RayGroup &group, Counters &counters) {
                             trace_any_unordered(*tree.tree, group, trace_options,
                                                 occluded.data() + first, counters);

@@ -48,7 +48,7 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> primitive(rays.count());
     const Counters counters = rays.for_each_group(
-        group_size(rays, trace_options),
+        unordered_group_size(trace_options, rays.count()),
         [&](size_t first, const RayGroup &group, Counters &c) {
             trace_closest_unordered(*self.tree, group, trace_options,
                                     {t.data() + first, primitive.data() + first}, c);
@@ -75,7 +75,7 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const RayArrays rays(origins, directions, t_min, t_max);
     std::vector<uint8_t> occluded(rays.count());
     const Counters counters =
-        rays.for_each_group(group_size(rays, trace_options),
+        rays.for_each_group(unordered_group_size(trace_options, rays.count()),
                             [&](size_t first, const RayGroup &group, Counters &c) {
                                 trace_any_unordered(*self.tree, group, trace_options,
                                                     occluded.data() + first, c);

@@ -5,7 +5,6 @@
 #include "base/parallel.h"
 #include "bind/mesh_arrays.h"
 #include "bind/watch.h"
-#include "mlrta/trace_unordered.h"
 #include "traverse/ray_group.h"
 
 #include <algorithm>
@@ -97,13 +96,5 @@ private:
     const float *t_min_, *t_max_;
     size_t count_;
 };
-
-// Whether all rays are likely to have one origin: each group finds out for itself.
-inline uint32_t group_size(const RayArrays &rays, const TraceOptions &options) {
-    const size_t count = rays.count();
-    return unordered_group_size(options, count,
-                                count > 0 && rays.origin(0) == rays.origin(count / 2) &&
-                                    rays.origin(0) == rays.origin(count - 1));
-}
 
 } // namespace mlrt

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
@@ -22,6 +23,13 @@ constexpr float WIDER = 2;
 
 // Cells along the longer side of the plane, as bits.
 constexpr uint32_t CELL_BITS = 10;
+
+// Bits of a cell's number to leave out, so that a cell holds about SHARING rays.
+uint32_t dropped_bits(uint32_t count) {
+    constexpr uint32_t SHARING = 64; // chosen from 16 to 1024 by area lights and skies
+    return 2 * CELL_BITS -
+           std::min<uint32_t>(std::bit_width(count / SHARING), 2 * CELL_BITS);
+}
 
 // The rectangle around points, lane by lane.
 struct Extent {
@@ -46,7 +54,7 @@ RayOrder::RayOrder(const RayGroup &rays) {
     map_to_plane(rays);
     pays_ = is_scattered();
     if (pays_)
-        sort();
+        sort(rays.has_common_origin ? 0 : dropped_bits(rays.count));
 }
 
 void RayOrder::map_to_plane(const RayGroup &rays) {
@@ -106,14 +114,15 @@ bool RayOrder::is_scattered() const {
 }
 
 // A counting sort in two steps of ten bits each, lower ones first.
-void RayOrder::sort() {
+void RayOrder::sort(uint32_t dropped_bits) {
     constexpr uint32_t CELLS = 1u << CELL_BITS;
     const float side = std::max(width_, height_);
     const float scale = side > 0 ? float(CELLS - 1) / side : 0;
     std::vector<uint32_t> codes(count_), half_sorted(count_);
     for (uint32_t i = 0; i < count_; ++i)
         codes[i] = morton_code(uint32_t(int((x_[i] - left_) * scale)),
-                               uint32_t(int((y_[i] - top_) * scale)));
+                               uint32_t(int((y_[i] - top_) * scale))) >>
+                   dropped_bits;
     numbers_.resize(count_);
     std::iota(numbers_.begin(), numbers_.end(), 0u);
     for (const uint32_t shift : {0u, CELL_BITS}) {

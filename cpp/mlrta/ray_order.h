@@ -1,5 +1,6 @@
-// Rays of a common origin in an order that beams can be made of, whatever order they come
-// in: line by line of an image, or none at all.
+// Rays in an order that beams can be made of, whatever order they come in: line by line of
+// an image, or none at all. Rays without a common origin make no beams, but packets and
+// single rays that go the same way share more of the tree too.
 #pragma once
 
 #include "traverse/ray_group.h"
@@ -11,7 +12,8 @@ namespace mlrt {
 
 // Neighbours in this order go in similar directions: directions are mapped to the plane
 // through an octahedron (Meyer et al. 2010, "On floating-point normal vectors") and taken
-// along a Morton curve.
+// along a Morton curve. Without a common origin the cells of the curve are so large that
+// each holds some rays, in the order in which they came, which is that of their origins.
 class RayOrder {
 public:
     // More are not worth the memory that they take; chosen.
@@ -29,7 +31,7 @@ public:
 private:
     void map_to_plane(const RayGroup &rays);
     bool is_scattered() const;
-    void sort();
+    void sort(uint32_t dropped_bits);
 
     uint32_t count_ = 0;
     std::vector<float> x_, y_; // of each ray in the plane, in whole packets

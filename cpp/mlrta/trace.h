@@ -38,8 +38,9 @@ enum class Culling : uint32_t {
 };
 
 // A packet gains more from each node that it need not visit than a beam does, which visits
-// it once for all of its rays: usual are MTS 32 and a frontier of 8 for packets, MTS 64 and
-// one entry point for beams.
+// it once for all of its rays: usual are MTS 32 and a frontier of 8 for packets with a
+// common origin, MTS 64 and one entry point for beams, and for rays without a common
+// origin, whose tiles rule out little.
 struct TraceOptions {
     Traversal traversal = Traversal::adaptive;
     bool entry_points = true;   // MLRTA: search an entry point for each tile

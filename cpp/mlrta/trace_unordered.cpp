@@ -10,8 +10,8 @@ namespace mlrt {
 
 namespace {
 
-bool makes_beams(const RayGroup &rays, const TraceOptions &options) {
-    return rays.has_common_origin && rays.count <= RayOrder::MOST_RAYS &&
+bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
+    return rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
 }
@@ -33,7 +33,7 @@ void put_back(const std::vector<uint32_t> &numbers, const std::vector<Value> &or
 
 // Copies of the rays of a group in an order of their own.
 struct OrderedRays {
-    std::vector<float> direction[3], t_min, t_max;
+    std::vector<float> origin[3], direction[3], t_min, t_max;
     RayGroup group;
 
     OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers)
@@ -42,6 +42,10 @@ struct OrderedRays {
         for (int k = 0; k < 3; ++k) {
             direction[k] = in_order(numbers, rays.direction[k]);
             group.direction[k] = direction[k].data();
+            if (!rays.has_common_origin) {
+                origin[k] = in_order(numbers, rays.origin[k]);
+                group.origin[k] = origin[k].data();
+            }
         }
         group.t_min = t_min.data();
         group.t_max = t_max.data();
@@ -53,12 +57,9 @@ struct OrderedRays {
 
 } // namespace
 
-uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays,
-                              bool have_common_origin) {
+uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays) {
     constexpr uint64_t ENOUGH_GROUPS = 16; // for all threads to have work; chosen
     const uint64_t usual = std::max(options.initial_tile * options.initial_tile, 1024u);
-    if (!have_common_origin)
-        return uint32_t(usual);
     return uint32_t(
         std::max(usual, std::min<uint64_t>(rays / ENOUGH_GROUPS, RayOrder::MOST_RAYS)));
 }
@@ -67,7 +68,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters) {
     std::optional<RayOrder> order;
-    if (makes_beams(rays, options))
+    if (may_be_sorted(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -88,7 +89,7 @@ void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
     std::optional<RayOrder> order;
-    if (makes_beams(rays, options))
+    if (may_be_sorted(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_any(tree, rays, options, occluded, counters);

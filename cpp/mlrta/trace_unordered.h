@@ -9,11 +9,10 @@
 namespace mlrt {
 
 // As many rays as are best handed over at once.
-uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays,
-                              bool have_common_origin);
+uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays);
 
-// Both sort the rays if they have a common origin, beams may be made of them, and that
-// makes beams much narrower. Others stay in their order.
+// Both sort the rays if that makes beams of neighbours much narrower. Others stay in their
+// order.
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters);

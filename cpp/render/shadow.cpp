@@ -1,5 +1,6 @@
 #include "render/shadow.h"
 
+#include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
 
 #include <algorithm>
@@ -76,7 +77,10 @@ void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &optio
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();
     }
-    trace_any(*scene.tree, rays, options, occluded_.data(), counters);
+    if (from_light_ || cost)
+        trace_any(*scene.tree, rays, options, occluded_.data(), counters);
+    else
+        trace_any_unordered(*scene.tree, rays, options, occluded_.data(), counters);
     if (scene.objects)
         trace_any_objects(*scene.objects, rays, occluded_.data(), counters);
     for (uint32_t i = 0; cost && i < count_; ++i)
