@@ -102,8 +102,10 @@ struct FilteredVolumes {
         const Real size = maximum(largest(a), maximum(largest(b), largest(c)));
         const Real direction_sum =
             absolute(direction.x) + absolute(direction.y) + absolute(direction.z);
-        error = (2 * 9 * FLOAT_ROUNDOFF) * direction_sum * (size * size) +
-                UNDERFLOW * direction_sum + SMALLEST_BOUND;
+        // More than UNDERFLOW, which processors take a hundred cycles to multiply by.
+        error = direction_sum *
+                    ((2 * 9 * FLOAT_ROUNDOFF) * (size * size) + SMALLEST_BOUND) +
+                SMALLEST_BOUND;
         error = select(MaskOf<Real>((size < LARGEST_SIZE) & (error < LARGEST_BOUND)), error,
                        Real(INFINITY));
     }

@@ -11,6 +11,20 @@
 
 namespace mlrt {
 
+namespace {
+
+// Rays that are sorted by direction make packets worth while, but go everywhere from all
+// over the tile, so that entry points hardly save a step.
+TraceOptions for_sorted_rays(TraceOptions options) {
+    if (options.traversal != Traversal::adaptive)
+        return options;
+    options.traversal = Traversal::packet;
+    options.entry_points = false;
+    return options;
+}
+
+} // namespace
+
 SampleShares::SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples) {
     const float sum = float(emitter_samples + bsdf_samples);
     emitters = float(emitter_samples) / sum;
@@ -30,11 +44,13 @@ void BsdfRays::reserve(size_t size) {
     density_.resize(size);
     t_min_.resize(size, 0.0f);
     t_max_.resize(size, std::numeric_limits<float>::max());
-    primitive_.resize(size);
-    blocked_.resize(size);
-    if (scene_.data.objects) {
-        instance_.resize(size, NO_INSTANCE);
-        t_.resize(size);
+    for (Hits *hits : {&found_, &hits_}) {
+        hits->primitive.resize(size);
+        hits->blocked.resize(size);
+        if (scene_.data.objects) {
+            hits->instance.resize(size);
+            hits->t.resize(size);
+        }
     }
 }
 
@@ -52,7 +68,8 @@ void BsdfRays::append(const BsdfSamples &samples, const UIntPacket &ray,
     count_ += uint32_t(std::popcount(samples.lanes));
 }
 
-void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float *cost) {
+void BsdfRays::find_hits(const TraceOptions &given, Counters &counters, float *cost) {
+    const TraceOptions options = for_sorted_rays(given);
     RayGroup rays;
     rays.count = count_;
     for (int k = 0; k < 3; ++k) {
@@ -61,24 +78,36 @@ void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float 
     }
     rays.t_min = t_min_.data();
     rays.t_max = t_max_.data();
+    order_.sort(rays);
+    RayGroup sorted = order_.group();
     if (cost) {
         cost_.assign(count_, 0.0f);
-        rays.cost = cost_.data();
+        sorted.cost = cost_.data();
     }
     const SceneData &scene = scene_.data;
     if (!scene_.any_shape_glows) {
-        trace_any(*scene.tree, rays, options, blocked_.data(), counters);
+        trace_any(*scene.tree, sorted, options, found_.blocked.data(), counters);
         if (scene.objects)
-            trace_any_objects(*scene.objects, rays, blocked_.data(), counters);
+            trace_any_objects(*scene.objects, sorted, found_.blocked.data(), counters);
+        order_.put_back(found_.blocked, hits_.blocked.data());
     } else {
-        float *t = scene.objects ? t_.data() : nullptr;
-        trace_closest(*scene.tree, rays, options, {t, primitive_.data()}, counters);
-        if (scene.objects)
-            trace_closest_objects(*scene.objects, rays,
-                                  {t, primitive_.data(), instance_.data()}, counters);
+        float *t = scene.objects ? found_.t.data() : nullptr;
+        trace_closest(*scene.tree, sorted, options, {t, found_.primitive.data()}, counters);
+        if (scene.objects) {
+            trace_closest_objects(*scene.objects, sorted,
+                                  {t, found_.primitive.data(), found_.instance.data()},
+                                  counters);
+            order_.put_back(found_.t, hits_.t.data());
+            order_.put_back(found_.instance, hits_.instance.data());
+        }
+        order_.put_back(found_.primitive, hits_.primitive.data());
     }
-    for (uint32_t i = 0; cost && i < count_; ++i)
-        cost[ray_[i]] += cost_[i];
+    if (!cost)
+        return;
+    std::vector<float> by_ray(count_);
+    order_.put_back(cost_, by_ray.data());
+    for (uint32_t i = 0; i < count_; ++i)
+        cost[ray_[i]] += by_ray[i];
 }
 
 Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t first) const {
@@ -94,7 +123,7 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
     shape_numbers.fill(NONE);
     HitPacket hit;
     for_each_lane(hits, [&](uint32_t lane) {
-        const uint32_t shape = scene_.shape_of_face[primitive_[first + lane]];
+        const uint32_t shape = scene_.shape_of_face[hits_.primitive[first + lane]];
         emitters[lane] = scene_.data.shapes[shape].emitter;
         shape_numbers[lane] = shape;
         hit.lanes |= LaneBits(emitters[lane] != NONE) << lane;
@@ -103,10 +132,10 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
         return light;
     hit.origin = vector(start_, first);
     hit.direction = vector(direction_, first);
-    hit.faces = load<UIntPacket>(&primitive_[first]);
+    hit.faces = load<UIntPacket>(&hits_.primitive[first]);
     if (scene_.data.objects) {
-        hit.t = load<FloatPacket>(&t_[first]);
-        hit.instances = load<UIntPacket>(&instance_[first]);
+        hit.t = load<FloatPacket>(&hits_.t[first]);
+        hit.instances = load<UIntPacket>(&hits_.instance[first]);
     }
     const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
     const Vec3<FloatPacket> from = vector(p_, first);
@@ -159,8 +188,8 @@ void BsdfRays::trace(const TraceOptions &options, Counters &counters, float *cos
         LaneBits misses = 0;
         for_each_lane(lanes, [&](uint32_t lane) {
             const bool miss = scene_.any_shape_glows
-                                  ? primitive_[first + lane] == NO_PRIMITIVE
-                                  : blocked_[first + lane] == 0;
+                                  ? hits_.primitive[first + lane] == NO_PRIMITIVE
+                                  : hits_.blocked[first + lane] == 0;
             misses |= LaneBits(miss) << lane;
         });
         Vec3<FloatPacket> light = in_all_lanes({});

@@ -5,6 +5,7 @@
 #include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/bsdf_sampling.h"
+#include "render/direction_order.h"
 #include "render/prepared_scene.h"
 
 #include <cstdint>
@@ -57,9 +58,13 @@ private:
     std::vector<float> start_[3], p_[3], direction_[3], weight_[3];
     std::vector<float> density_, t_min_, t_max_, cost_;
     // What the rays meet; distances and instances only if the scene has objects.
-    std::vector<uint32_t> primitive_, instance_;
-    std::vector<float> t_;
-    std::vector<uint8_t> blocked_; // in place of these where nothing glows
+    struct Hits {
+        std::vector<uint32_t> primitive, instance;
+        std::vector<float> t;
+        std::vector<uint8_t> blocked; // in place of these where nothing glows
+    };
+    DirectionOrder order_;
+    Hits found_, hits_; // in that order, and in the order of the rays
 };
 
 } // namespace mlrt
