@@ -103,9 +103,9 @@ struct FilteredVolumes {
         const Real direction_sum =
             absolute(direction.x) + absolute(direction.y) + absolute(direction.z);
         // More than UNDERFLOW, which processors take a hundred cycles to multiply by.
-        error = direction_sum *
-                    ((2 * 9 * FLOAT_ROUNDOFF) * (size * size) + SMALLEST_BOUND) +
-                SMALLEST_BOUND;
+        error =
+            direction_sum * ((2 * 9 * FLOAT_ROUNDOFF) * (size * size) + SMALLEST_BOUND) +
+            SMALLEST_BOUND;
         error = select(MaskOf<Real>((size < LARGEST_SIZE) & (error < LARGEST_BOUND)), error,
                        Real(INFINITY));
     }

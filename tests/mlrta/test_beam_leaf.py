@@ -218,7 +218,10 @@ def test_regrouping_keeps_every_ray(core: ModuleType, share: float) -> None:
         assert sorted(before + beyond) in (active, [])
         if gap > 0:
             cuts += 1
-            half, other_half = ([r for r in active if r < 128], [r for r in active if r >= 128])
+            half, other_half = (
+                [r for r in active if r < 128],
+                [r for r in active if r >= 128],
+            )
             assert (before, beyond) in ((half, other_half), (other_half, half))
     assert cuts == 1
 
