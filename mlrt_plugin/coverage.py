@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from .elements import Element
-from .features import REFUSED, reason_against
+from .features import LIGHT_TEXTURES, REFUSED, reason_against
 from .integrators import AOV_NAMES, TAKEN_OVER, what_is_missing
 from .materials import SPECULAR
 from .scene_arrays import Lighting
-from .textures import VARYING
 
 MITSUBA = "3.9.1"
 PLUGINS = {
@@ -57,19 +56,25 @@ NO_LIGHT_SAMPLE = (
     "black for light samples; by Mitsuba where BSDF samples can find lights in it"
 )
 HIT_BY_MITSUBA = "where Mitsuba shades, it also finds the hits"
+ON_MATERIALS = "on materials of all native shapes, and as `radiance` of rectangles"
 ON_MESHES = "on materials of meshes that are not instanced; else by Mitsuba"
 REMARKS = {
     ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours and with native textures",
-    ("bsdf", "mask"): "of native materials, on meshes that are not instanced; shadow rays "
+    ("bsdf", "mask"): "of native materials; shadow rays "
     "stop at it, and BSDF samples find lights behind it, as in `direct`",
     ("bsdf", "null"): "BSDF samples find lights behind it",
     **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in SPECULAR},
-    **{("texture", plugin): ON_MESHES for plugin in VARYING},
-    ("emitter", "area"): "in constant colours; with textures by Mitsuba",
+    **{("texture", plugin): ON_MATERIALS for plugin in LIGHT_TEXTURES},
+    ("texture", "mesh_attribute"): ON_MESHES,
+    ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
+    "textures on rectangles that are not flipped; else by Mitsuba, as on meshes it depends "
+    "on Embree which of the faces at a point of the texture glows",
     ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
-    ("emitter", "spot"): "in constant colours; with a texture by Mitsuba",
-    ("emitter", "projector"): "its picture is looked up like a texture of a surface",
+    ("emitter", "spot"): "in constant colours, and without scale; else by Mitsuba",
+    ("emitter", "directional"): "without scale; else by Mitsuba",
+    ("emitter", "projector"): "rarely used, so that its sampling is not worth code here; "
+    "the image is the same",
     ("sensor", "orthographic"): "without shear; else by Mitsuba",
     ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
     ("integrator", "direct"): "with up to 256 samples of emitters and of BSDFs natively; "

@@ -107,27 +107,35 @@ class Places:
 
 
 def from_state(state: Any) -> list[Element]:
-    """The element of each node of a parsed scene; the first is the scene itself."""
+    """The element of each node of a parsed scene; the first is the scene itself. Objects
+    that are the same in all variants, images, count as properties."""
     elements = []
     places = Places([Path(str(file)) for file in state.files])
+    # Scenes have a hundred thousand nodes: names of enumerations are looked up once.
+    kinds = {t: KINDS.get(t.name, t.name.lower()) for t in mi.ObjectType}
+    types: Any = mi.Properties.Type
+    reference, instance = types.ResolvedReference, types.Object
+    all_properties = []
     for node in state.nodes:
+        props = node.props
+        all_properties.append(props)
         elements.append(
             Element(
-                kind=KINDS.get(node.type.name, node.type.name.lower()),
-                plugin=node.props.plugin_name(),
-                id=node.props.id(),
+                kind=kinds[node.type],
+                plugin=props.plugin_name(),
+                id=props.id(),
                 where=places.of(node.file_index, node.offset),
             )
         )
-    for node, element in zip(state.nodes, elements, strict=True):
-        for name in node.props.keys():  # noqa: SIM118 (Properties is no mapping)
-            type_name = node.props.type(name).name
-            if type_name == "ResolvedReference":
-                element.children.append((name, elements[node.props[name].index()]))
-            elif type_name == "Object":
-                element.children.append((name, from_object(node.props[name], name)))
+    for props, element in zip(all_properties, elements, strict=True):
+        for name in props.keys():  # noqa: SIM118 (Properties is no mapping)
+            kind, value = props.type(name), props[name]
+            if kind is reference:
+                element.children.append((name, elements[value.index()]))
+            elif kind is instance and value.variant_name():
+                element.children.append((name, from_object(value, name)))
             else:
-                element.properties[name] = node.props[name]
+                element.properties[name] = value
     return elements
 
 
@@ -142,6 +150,8 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
         nested["exterior"] = instance.exterior_medium()
         if element.plugin == "instance":
             element.properties["loaded"] = True
+        if element.plugin == "rectangle":
+            element.properties["flip_normals"] = bool(instance.has_flipped_normals())
     elif kind == "sensor":
         nested = {"film": instance.film(), "sampler": instance.sampler()}
     elif kind == "film":

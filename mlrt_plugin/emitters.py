@@ -11,8 +11,10 @@ import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .errors import SceneError, UnsupportedFeature
+from .materials import BLACK
+from .object_arrays import ANALYTIC_TYPES, ObjectArrays
 from .scene_arrays import Emitter, SceneArrays, Vec3, no_environment
-from .shape_arrays import NONE
+from .shape_arrays import NONE, Shape
 
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
@@ -26,10 +28,12 @@ def read_emitter(
     name: str,
     shape: int,
     corners: npt.NDArray[np.float32] | None,
+    texture: int = NONE,
 ) -> Emitter:
     """Reads one emitter.
 
-    shape: number of the shape that glows, for an area light.
+    shape: number of the shape that glows, for an area light. texture: number of what it
+    shows in place of one colour, for a `rectangle`.
     corners: (4, 3) vertices of that shape if it is a `rectangle`, which has its own way of
     sampling; in Mitsuba's order (0, 0), (1, 0), (0, 1), (1, 1) of (u, v).
     """
@@ -39,7 +43,7 @@ def read_emitter(
     if not (weight >= 0 and math.isfinite(weight)):
         raise SceneError(f"{name} has sampling_weight = {weight}: it must be at least 0")
     if plugin == "area":
-        radiance = objects.color(parts["radiance"], name)
+        radiance = BLACK if texture != NONE else objects.color(parts["radiance"], name)
         if corners is None:
             return Emitter("area", radiance, shape=shape, sampling_weight=weight)
         corner, along_u, along_v = corners[0], corners[1], corners[2]
@@ -47,6 +51,7 @@ def read_emitter(
             "area",
             radiance,
             shape=shape,
+            radiance_texture=texture,
             rectangle=True,
             corner=objects.vec3(corner),
             edge_u=objects.vec3(along_u - corner),
@@ -153,24 +158,54 @@ def check_distances(lights: Iterable[Emitter], bounds: tuple[Vec3, Vec3]) -> Non
             )
 
 
-def check_areas(arrays: SceneArrays) -> None:
+def check_areas(arrays: SceneArrays, bounds: tuple[Vec3, Vec3]) -> None:
     """Raises SceneError for a shape that glows and whose area is not zero, but too small a
-    number for single precision, in which it would be dark."""
-    for number, shape in enumerate(arrays.shapes):
+    number for single precision, alone or beside the square of the scene's extent: it would
+    be dark.
+
+    bounds: of all that can be hit.
+    """
+    extent = float(np.ptp(np.array(bounds, np.float64), axis=0).max())
+    names = arrays.shape_names
+    if arrays.objects is not None:
+        names += arrays.objects.shape_names
+    for number, shape in enumerate(arrays.all_shapes()):
         if shape.emitter == NONE:
             continue
-        faces = arrays.faces[shape.first_face : shape.first_face + shape.face_count]
-        a, b, c = (arrays.vertices[faces[:, k]].astype(np.float64) for k in range(3))
-        with np.errstate(invalid="ignore"):
-            area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        total = float(np.nansum(area))
-        if 0 < total < SMALLEST_AREA:
-            names = arrays.shape_names
+        others = arrays.objects
+        if others is None or shape.first_face < len(arrays.faces):
+            area = mesh_area(arrays, shape)
+        else:
+            area = analytic_area(others, shape)
+        if 0 < area < SMALLEST_AREA * max(1.0, extent**2):
             name = names[number] if number < len(names) else f"shape {number}"
+            beside = f" in a scene that measures {extent:.3g}" if extent > 1 else ""
             raise SceneError(
-                f"{name} glows and has an area of {total:.3g}, which is out of the range "
-                "of single precision: scale the scene up or remove the light"
+                f"{name} glows and has an area of {area:.3g}{beside}, which is out of the "
+                "range of single precision: enlarge the light or remove it"
             )
+
+
+def mesh_area(arrays: SceneArrays, shape: Shape) -> float:
+    """Of the faces of a mesh that are finite."""
+    faces = arrays.faces[shape.first_face : shape.first_face + shape.face_count]
+    a, b, c = (arrays.vertices[faces[:, k]].astype(np.float64) for k in range(3))
+    with np.errstate(invalid="ignore"):
+        area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return float(np.nansum(area))
+
+
+def analytic_area(objects: ObjectArrays, shape: Shape) -> float:
+    """Of a shape of the scene that is not cut into triangles, as the core has it."""
+    first = objects.shapes[-len(objects.analytic_types)].first_face
+    number = shape.first_face - first
+    x, y, z = objects.analytic_frames[number][:, :3].T
+    plugin = ANALYTIC_TYPES[objects.analytic_types[number]]
+    if plugin == "sphere":
+        return 4 * math.pi * float(x @ x)
+    if plugin == "disk":
+        return math.pi * float(np.linalg.norm(np.cross(x, y)))
+    return 2 * math.pi * float(np.linalg.norm(x) * np.linalg.norm(z))
 
 
 def finite(vector: Vec3, name: str, what: str) -> Vec3:
@@ -188,7 +223,7 @@ def unit_axis(to_world: npt.NDArray[np.float64], name: str) -> Vec3:
     """
     axes = to_world[:3, :3]
     objects.check_finite(to_world, name)
-    if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-3):
+    if not np.allclose(axes.T @ axes, np.eye(3), atol=objects.ORTHOGONAL):
         raise UnsupportedFeature(
             f"{name} has a to_world that scales, which is not supported: use a rotation "
             "and a "

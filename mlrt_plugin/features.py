@@ -25,6 +25,8 @@ FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
 SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler")
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
 TEXTURES = (*CONSTANT_TEXTURES, *VARYING)
+LIGHT_TEXTURES = ("bitmap", "checkerboard")
+"""Of those that vary, what an area light can show."""
 
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
 REFUSED = {
@@ -76,13 +78,20 @@ def reason_against(element: Element) -> str:
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
         return "the texture of a spot is not supported yet"
+    if plugin in ("spot", "directional") and scales(element.properties.get("to_world")):
+        return "its to_world scales, which is not supported yet"
     textures = [child.plugin for child in element.children_of("texture")]
-    if kind == "emitter" and set(textures) & set(VARYING):
-        return "textures of lights are not supported yet"
+    if kind == "emitter" and set(textures) & set(VARYING) - set(LIGHT_TEXTURES):
+        return f"of textures it can have {', '.join(LIGHT_TEXTURES)} only so far"
     if kind == "shape" and textures:
         return "textures that are attributes of a shape are not supported yet"
-    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_varying_parts(element):
-        return "textures and masks on it are not supported yet"
+    if kind == "shape" and has_textured_light(element):
+        if plugin != "rectangle":
+            return "lights with a texture are supported on rectangles only so far"
+        if element.properties.get("flip_normals", False):
+            return "its light has a texture and is turned by flip_normals"
+    if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_attributes(element):
+        return "textures of the type mesh_attribute are not supported on it yet"
     if plugin == "instance" and element.properties.get("loaded"):
         return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
@@ -103,14 +112,18 @@ def reason_against(element: Element) -> str:
     return ""
 
 
-def has_varying_parts(shape: Element) -> bool:
-    """Whether something about a shape, or a group of them, varies over its surface."""
+def has_textured_light(shape: Element) -> bool:
+    """Whether a shape is an area light whose radiance varies."""
     return any(
-        part.plugin not in CONSTANT_TEXTURES
-        if part.kind == "texture"
-        else part.kind == "bsdf" and part.plugin == "mask"
-        for part in shape.walk()
+        texture.plugin in VARYING
+        for emitter in shape.children_of("emitter")
+        for texture in emitter.children_of("texture")
     )
+
+
+def has_attributes(shape: Element) -> bool:
+    """Whether a shape, or one of a group, shows what is stored with its mesh."""
+    return any(part.plugin == "mesh_attribute" for part in shape.walk())
 
 
 def shears(to_world: Any) -> bool:
@@ -122,6 +135,18 @@ def shears(to_world: Any) -> bool:
     if not np.isfinite(matrix).all() or objects.is_singular(matrix):
         return False
     return not objects.is_orthogonal(matrix)
+
+
+def scales(to_world: Any) -> bool:
+    """Whether a transformation, None for none, is more than a rotation and a translation;
+    False also if it is not finite or flattens, which is told elsewhere."""
+    if to_world is None:
+        return False
+    matrix = objects.matrix(to_world)
+    if not np.isfinite(matrix).all() or objects.is_singular(matrix):
+        return False
+    axes = matrix[:3, :3]
+    return not np.allclose(axes.T @ axes, np.eye(3), atol=objects.ORTHOGONAL)
 
 
 def refuse_refused(scene: Element, sensor: int) -> None:

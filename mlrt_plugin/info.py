@@ -47,7 +47,7 @@ def scene_report(
         lines.append(f"needs --force-direct: {refusal}")
     warnings = integrator_warnings(summary.features, summary.lighting)
     if native and not other and not refusal:
-        arrays = import_scene(scene, sensor=sensor, defines=defines)
+        arrays = import_scene(scene, sensor=sensor, defines=defines, summary=summary)
         film = arrays.film
         lines += [
             f"faces: {len(arrays.faces)}, vertices: {len(arrays.vertices)}, "

@@ -14,7 +14,7 @@ from .elements import Element, from_object
 from .errors import UnsupportedFeature
 from .scene_arrays import Vec3
 from .shape_arrays import NONE
-from .textures import Surface, TextureTable, child_of
+from .textures import VARYING, Surface, TextureTable, child_of
 
 BLACK: Vec3 = (0.0, 0.0, 0.0)
 SPECULAR = ("conductor", "dielectric", "thindielectric")
@@ -82,6 +82,19 @@ class MaterialTable:
             any(self.textures.uses_coordinates(int(number)) for number in row)
             for row in self.texture_array()
         ]
+
+    def add_light(self, surface: Surface, elements: Mapping[str, Element]) -> int:
+        """Number of the texture that the light on a shape shows; NONE for one colour, and
+        for a shape that is no light. Raises as `add` does."""
+        emitter = surface.shape.emitter()
+        if emitter is None:
+            return NONE
+        radiance = objects.members(emitter)["radiance"]
+        if objects.plugin_name(radiance) not in VARYING:
+            return NONE
+        element = elements.get(emitter.id()) or from_object(emitter)
+        child = child_of(element, "radiance", radiance)
+        return self.textures.add_colour(radiance, child, surface)
 
     def _read(self, bsdf: Any, element: Element, surface: Surface) -> Material:
         plugin = objects.plugin_name(bsdf)

@@ -58,11 +58,11 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
                 f"{name} glows, but its area is zero or infinite in single precision: "
                 "repair the mesh, or scale the scene"
             )
-        # A rectangle ignores the normals of its vertices.
+        # Those of a rectangle are that of its faces, unless it is mirrored.
         smooth = (
             shape.has_vertex_normals()
             and not shape.has_face_normals()
-            and objects.plugin_name(shape) != "rectangle"
+            and (objects.plugin_name(shape) != "rectangle" or is_mirrored(shape))
         )
         directions = np.zeros_like(points)
         repaired = 0
@@ -103,6 +103,16 @@ def gather(shapes: list[Any], names: list[str]) -> Geometry:
         dropped=not_finite,
         warnings=warnings,
     )
+
+
+def is_mirrored(rectangle: Any) -> bool:
+    """Whether the normals of a rectangle's vertices point to the back of its faces, as
+    those of a to_world that mirrors do: Mitsuba shades by the former."""
+    points = np.array(rectangle.vertex_positions_buffer(), np.float64).reshape(-1, 3)
+    normals = np.array(rectangle.vertex_normals_buffer(), np.float64).reshape(-1, 3)
+    along_u, along_v = points[1] - points[0], points[2] - points[0]
+    with np.errstate(invalid="ignore", over="ignore"):
+        return bool(np.cross(along_u, along_v) @ normals[0] < 0)
 
 
 def rectangle_corners(geometry: Geometry, shapes: list[Any], number: int) -> Any:

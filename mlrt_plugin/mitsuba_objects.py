@@ -4,6 +4,7 @@ moment."""
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import mitsuba as mi
@@ -154,8 +155,13 @@ def matrix(transform: Any) -> npt.NDArray[np.float64]:
 
 def is_singular(to_world: npt.NDArray[np.float64]) -> bool:
     """Whether a finite matrix flattens what it moves."""
-    stretch = np.linalg.svd(to_world[:3, :3], compute_uv=False)
-    return bool(stretch[2] <= 1e-12 * stretch[0])
+    return bool(are_singular(to_world[None])[0])
+
+
+def are_singular(to_world: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+    """Which of (N, 4, 4) finite matrices flatten what they move."""
+    stretch = np.linalg.svd(to_world[:, :3, :3], compute_uv=False)
+    return np.asarray(stretch[:, 2] <= 1e-12 * stretch[:, 0])
 
 
 def is_orthogonal(to_world: npt.NDArray[np.float64]) -> bool:
@@ -166,10 +172,20 @@ def is_orthogonal(to_world: npt.NDArray[np.float64]) -> bool:
 
 def check_invertible(to_world: npt.NDArray[np.float64], name: str) -> None:
     """Raises SceneError for a matrix that is not finite or flattens what it moves."""
-    check_finite(to_world, name)
-    if is_singular(to_world):
+    check_all_invertible(to_world[None], [name])
+
+
+def check_all_invertible(
+    to_world: npt.NDArray[np.float64], names: Sequence[object]
+) -> None:
+    """Raises SceneError for the first of (N, 4, 4) matrices that is not finite or flattens
+    what it moves; `names` say whose they are."""
+    finite: npt.NDArray[np.bool_] = np.asarray(np.isfinite(to_world).all(axis=(1, 2)))
+    singular = are_singular(np.where(finite[:, None, None], to_world, np.eye(4)))
+    for number in np.flatnonzero(~finite | singular)[:1]:
+        check_finite(to_world[number], str(names[number]))
         raise SceneError(
-            f"{name} has a singular to_world, which flattens it: no scale may be 0"
+            f"{names[number]} has a singular to_world, which flattens it: no scale may be 0"
         )
 
 

@@ -7,9 +7,9 @@ entry points: the variant that the caller has set, if any, stays set.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -77,6 +77,10 @@ class ParsedScene:
     @property
     def root(self) -> Element:
         return self.elements[0]
+
+    def of_variant(self, variant: str) -> ParsedScene:
+        """The same, to be loaded in another variant; not if it holds loaded objects."""
+        return replace(self, config=parser_config(variant))
 
 
 def failing_element(message: str, elements: Sequence[Element]) -> Element | None:
@@ -243,7 +247,7 @@ def with_known_integrators(scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def embedded_objects(value: object) -> Iterator[Any]:
-    """All Mitsuba objects that a scene dictionary holds."""
+    """All Mitsuba objects that a scene dictionary holds; images have no variant."""
     if isinstance(value, mi.Object):
         yield value
     elif isinstance(value, Mapping):
@@ -277,16 +281,20 @@ def register_collector(variant: str) -> None:
     _collecting.add(variant)
 
 
-def instantiate(parsed: ParsedScene) -> tuple[list[Any], dict[str, Element]]:
+def instantiate(
+    parsed: ParsedScene, left_out: Collection[str] = ()
+) -> tuple[list[Any], dict[str, Element]]:
     """Loads what a parsed scene declares, in that order, and tells which element each
     object came from, by its id.
 
-    Integrators are not loaded: they are taken over, and may be unknown in the reading
-    variant.
+    left_out: names of children of the scene that are not loaded. Integrators are not loaded
+    either: they are taken over, and may be unknown in the reading variant.
     """
     by_id = numbered(parsed)
     register_collector(parsed.config.variant)
     root = parsed.state.nodes[0]
+    for name in left_out:
+        del root.props[name]
     root.props.set_plugin_name(COLLECTOR)
     root.type = mi.ObjectType.Texture
     return loaded(parsed).parts, by_id

@@ -26,8 +26,8 @@ from .options import (
 )
 from .samplers import checked_spp, own_spp, possible_spp, rounded
 from .scene_arrays import Lighting, SceneArrays, same_geometry
-from .scene_import import SceneSource, import_scene
-from .shading_choice import ShadingChoice, choose_shading
+from .scene_import import SceneSource, import_scene, summarise
+from .shading_choice import ShadingChoice, choice_for
 from .shape_arrays import Shape
 from .texture_arrays import fields_of
 from .threads import thread_count
@@ -210,9 +210,8 @@ def prepare(
     if isinstance(scene, SceneArrays):
         arrays, choice = scene, NATIVE
     else:
-        choice = choose_shading(
-            scene, shading, sensor=sensor, defines=defines, lighting=lighting
-        )
+        summary = summarise(scene, sensor=sensor, defines=defines)
+        choice = choice_for(summary, shading, lighting or summary.lighting)
         if choice.path == "mitsuba":
             # Not loaded where it is not used: Mitsuba's llvm variant takes a while.
             from .hybrid.prepared import prepare_hybrid
@@ -229,6 +228,7 @@ def prepare(
                 previous=previous,
                 tree_cache=tree_cache,
                 build=build,
+                summary=summary,
             )
         arrays = import_scene(
             scene,
@@ -237,6 +237,7 @@ def prepare(
             resolution=resolution,
             lighting=lighting,
             force_direct=force_direct,
+            summary=summary,
         )
     build = {**arrays.lighting.own_options(BUILD_OPTIONS), **build}
     loaded = time.perf_counter()
@@ -247,8 +248,9 @@ def prepare(
         obtained = ObtainedTree(tree, {"build": time.perf_counter() - loaded})
     others = obtain_objects(arrays.objects, len(arrays.faces), build, tree_cache)
     add_timings(obtained.timings, others.timings)
-    check_distances(arrays.emitters, common_bounds(obtained.tree, others.handle))
-    check_areas(arrays)
+    bounds = common_bounds(obtained.tree, others.handle)
+    check_distances(arrays.emitters, bounds)
+    check_areas(arrays, bounds)
     hide = arrays.lighting.hide_emitters if hide_emitters is None else hide_emitters
     handle = core.Scene(
         obtained.tree,

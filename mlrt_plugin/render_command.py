@@ -9,13 +9,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from .errors import OutputError, one_sentence
+from .errors import MlrtError, OutputError, one_sentence
 from .image_files import check_output, write_image
 from .integrators import own_aovs
 from .options import AOVS, SHADOW_OFFSETS
 from .progress import ProgressBar
 from .render import checked_seed, prepare
 from .samplers import checked_spp
+from .scene_import import summarise
 from .shading_choice import SHADINGS
 from .threads import thread_count
 from .tree_command import add_build_options, add_tree_cache, build_options_of
@@ -59,12 +60,15 @@ def aov_names(text: str) -> tuple[str, ...]:
     return names
 
 
-def sensor_numbers(text: str) -> tuple[int, ...]:
+def sensor_numbers(text: str) -> tuple[int, ...] | None:
+    """The numbers that are given; None for all."""
+    if text == "all":
+        return None
     try:
         return tuple(dict.fromkeys(int(number) for number in text.split(",")))
     except ValueError:
         raise argparse.ArgumentTypeError(
-            f"'{text}' is no number of a sensor, nor several such as 0,1"
+            f"'{text}' is no number of a sensor, nor several such as 0,1, nor all"
         ) from None
 
 
@@ -77,7 +81,7 @@ def add_render_options(render: argparse.ArgumentParser) -> None:
         "--sensor",
         type=sensor_numbers,
         default=(0,),
-        metavar="N[,N]...",
+        metavar="N[,N]...|all",
         help="number of the sensor, from 0; an image for each if there are several",
     )
     render.add_argument(
@@ -128,11 +132,12 @@ def jobs_of(arguments: argparse.Namespace) -> list[Job]:
 
     Raises OutputError if two of them would have the same name.
     """
-    several_sensors = len(arguments.sensor) > 1
-    several = several_sensors or len(arguments.scenes) > 1
+    chosen = [(scene, sensors_of(scene, arguments)) for scene in arguments.scenes]
+    several = sum(len(sensors) for _, sensors in chosen) > 1
     jobs = []
-    for scene in arguments.scenes:
-        for sensor in arguments.sensor:
+    for scene, sensors in chosen:
+        for sensor in sensors:
+            several_sensors = len(sensors) > 1
             name = f"{scene.stem}-{sensor}.exr" if several_sensors else f"{scene.stem}.exr"
             output = scene.with_name(name)
             if several and arguments.output is not None:
@@ -147,13 +152,26 @@ def jobs_of(arguments: argparse.Namespace) -> list[Job]:
         )
     by_output: dict[Path, Job] = {}
     for job in jobs:
-        other = by_output.setdefault(job.output, job)
+        other = by_output.setdefault(job.output.resolve(), job)
         if other is not job:
             raise OutputError(
                 f"{other} and {job} would both be written to '{job.output}': render them "
                 "in calls of their own"
             )
     return jobs
+
+
+def sensors_of(scene: Path, arguments: argparse.Namespace) -> tuple[int, ...]:
+    """The numbers of the sensors of a scene that are asked for. Of a scene that cannot be
+    parsed this is the first, which will then be complained of."""
+    if arguments.sensor is not None:
+        numbers: tuple[int, ...] = arguments.sensor
+        return numbers
+    try:
+        count = summarise(scene, defines=dict(arguments.define)).sensor_count
+    except MlrtError:
+        return (0,)
+    return tuple(range(max(1, count)))
 
 
 def run_render(arguments: argparse.Namespace) -> None:

@@ -59,6 +59,7 @@ class Emitter:
     cutoff_angle: float = 0.0
     beam_width: float = 0.0
     shape: int = NONE
+    radiance_texture: int = NONE
     rectangle: bool = False
     corner: Vec3 = (0.0, 0.0, 0.0)
     edge_u: Vec3 = (0.0, 0.0, 0.0)

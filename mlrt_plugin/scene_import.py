@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from . import camera as cameras
 from . import (
@@ -24,6 +25,8 @@ from . import (
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError, UnsupportedFeature
+from .image_headers import check_image_file
+from .loaded_scene import LoadedScene
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
 from .options import integer
@@ -43,41 +46,19 @@ ENVIRONMENTS = ("constant", "envmap", "sunsky", "timed_sunsky")
 
 @dataclass(frozen=True)
 class SceneSummary:
-    """What a scene uses, found without loading its meshes."""
+    """What a scene uses, found without loading its meshes.
+
+    root: its elements. parsed: what it was read from, None for a scene that was loaded.
+    """
 
     features: tuple[Feature, ...]
     lighting: Lighting
-    sensor_count: int
+    root: Element
+    parsed: parsing.ParsedScene | None = None
 
-
-@dataclass(frozen=True)
-class LoadedScene:
-    """The objects of a loaded scene, each kind in the order of declaration.
-
-    groups: the shapes of each shapegroup, by its id.
-    """
-
-    shapes: list[Any]
-    emitters: list[Any]
-    sensors: list[Any]
-    groups: dict[str, list[Any]] = field(default_factory=dict)
-
-    @staticmethod
-    def of_parts(parts: list[Any]) -> LoadedScene:
-        """Sorts objects by kind, the way a `scene` of Mitsuba does (scene.cpp)."""
-        scene = LoadedScene([], [], [])
-        for part in parts:
-            kind = elements.kind_of(part)
-            if kind == "shape":
-                scene.shapes.append(part)
-                if part.emitter() is not None:
-                    scene.emitters.append(part.emitter())
-            elif kind == "emitter" and objects.plugin_name(part) != "area":
-                # An area light that stands alone is only declared, for a shape to refer to.
-                scene.emitters.append(part)
-            elif kind == "sensor":
-                scene.sensors.append(part)
-        return scene
+    @property
+    def sensor_count(self) -> int:
+        return len(list(self.root.children_of("sensor")))
 
 
 def import_scene(
@@ -88,6 +69,7 @@ def import_scene(
     resolution: tuple[int, int] | None = None,
     lighting: Lighting | None = None,
     force_direct: bool = False,
+    summary: SceneSummary | None = None,
 ) -> SceneArrays:
     """Reads a scene.
 
@@ -99,6 +81,8 @@ def import_scene(
     horizontal field of view is kept.
     lighting: what to render in place of what the scene's integrator asks for.
     force_direct: whether to render direct illumination where the integrator asks for more.
+    summary: what `summarise` gave for the same scene, sensor and defines, so that it is not
+    parsed again; each can be used once.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
@@ -125,32 +109,33 @@ def import_scene(
                 f"the scene is loaded in the variant {scene.variant_name()}: load it in an "
                 "RGB variant"
             )
+    if summary is None:
+        summary = summarise(scene, sensor=sensor, defines=defines)
+    names: dict[str, Element] = {}
+    if summary.parsed is None:
         sensors, sensor = sensors_of(scene, sensor)
-        root = elements.from_scene(scene, sensors)
-        names: dict[str, Element] = {}
         loaded = LoadedScene(list(scene.shapes()), list(scene.emitters()), sensors)
-        name = "the scene"
-    else:
-        parsed = parse(scene, defines)
-        root, name = parsed.root, f"scene '{parsed.name}'"
-    check_contents(root, sensor, name)
-    found = features.list_features(root, sensor)
+    found, parsed = summary.features, summary.parsed
+    name = f"scene '{parsed.name}'" if parsed is not None else "the scene"
+    check_contents(summary.root, sensor, name)
     features.refuse_unsupported(found)
     if lighting is None:
-        lighting = lighting_of(scene, root)
+        lighting = summary.lighting
     integrators.check_integrator(found, lighting, force_direct)
     obstacle = integrators.native_obstacle(found, lighting)
     if obstacle:
         raise UnsupportedFeature(obstacle)
     warnings = integrators.integrator_warnings(found, lighting)
-    if not is_loaded_scene(scene):
+    if parsed is not None:
         check_transforms(parsed)
         check_files(parsed)
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
-        parts, names = parsing.instantiate(parsed)
+        parts, names = parsing.instantiate(parsed, scene_objects.plain_instances(parsed))
         loaded = replace(
-            LoadedScene.of_parts(parts), groups=scene_objects.group_children(parsed, names)
+            LoadedScene.of_parts(parts),
+            groups=scene_objects.group_children(parsed, names),
+            instances=scene_objects.instances_of(parsed),
         )
     return collect(loaded, names, sensor, resolution, found, lighting, warnings)
 
@@ -164,14 +149,12 @@ def summarise(
     """
     if is_loaded_scene(scene):
         sensors, sensor = sensors_of(scene, sensor)
-        root = elements.from_scene(scene, sensors)
+        root, parsed = elements.from_scene(scene, sensors), None
     else:
-        root = parse(scene, defines).root
-    return SceneSummary(
-        features.list_features(root, sensor),
-        lighting_of(scene, root),
-        len(list(root.children_of("sensor"))),
-    )
+        parsed = parse(scene, defines)
+        root = parsed.root
+    found = features.list_features(root, sensor)
+    return SceneSummary(found, lighting_of(scene, root), root, parsed)
 
 
 def lighting_of(scene: SceneSource, root: Element) -> Lighting:
@@ -257,24 +240,33 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
 def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
     """Raises SceneError for a to_world that is not finite or flattens what it moves, of
     the shapes, the emitters and a sensor."""
-    for element in features.used_elements(parsed.root, sensor):
-        transform = element.properties.get("to_world")
-        if transform is None:
-            continue
-        objects.check_invertible(objects.matrix(transform), str(element))
+    moved = [
+        element
+        for element in features.used_elements(parsed.root, sensor)
+        if element.properties.get("to_world") is not None
+    ]
+    if moved:
+        matrices = [objects.matrix(e.properties["to_world"]) for e in moved]
+        objects.check_all_invertible(np.stack(matrices), moved)
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
-    """Raises SceneError for mesh files whose indices would make Mitsuba crash."""
+    """Raises SceneError for images without pixels, and for mesh files whose indices would
+    make Mitsuba crash."""
     checked = set()
     with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
+            for name in ("bitmap", "data"):
+                if 0 in np.shape(element.properties.get(name, 1)):
+                    raise SceneError(f"{element} has a {name} of no pixels: give it some")
             filename = element.properties.get("filename")
-            if element.kind != "shape" or filename is None:
+            if filename is None:
                 continue
             index = int(element.properties.get("shape_index", 0))
             path = parsing.resolved(str(filename))
-            if (path, index) not in checked:
+            if element.kind in ("texture", "emitter"):
+                check_image_file(path)
+            elif element.kind == "shape" and (path, index) not in checked:
                 checked.add((path, index))
                 check_mesh_file(path, element.plugin, index)
 
@@ -314,27 +306,34 @@ def collect(
             )
         return str(element)
 
-    by_way = scene_objects.sorted_shapes(scene.shapes, scene.groups, names)
+    by_way = scene_objects.sorted_shapes(scene.shapes, scene.instances, scene.groups, names)
     shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
     materials = MaterialTable()
-    surfaces = zip(
-        shapes, shape_names, geometry.first_faces, geometry.first_vertices, strict=True
-    )
-    rows = [materials.add(Surface(*surface), names) for surface in surfaces]
-    needed = [materials.uses_coordinates()[row] for row in rows]
+    firsts = zip(geometry.first_faces, geometry.first_vertices, strict=True)
+    surfaces = [
+        Surface(shape, name, *first)
+        for shape, name, first in zip(shapes, shape_names, firsts, strict=True)
+    ]
+    rows = [materials.add(surface, names) for surface in surfaces]
+    lights = [materials.add_light(surface, names) for surface in surfaces]
+    textured = materials.uses_coordinates()
     framed = integrators.takes_bsdf_samples(found, lighting)
     coordinates = gather_coordinates(
-        shapes, shape_names, needed, geometry.first_vertices, framed
+        shapes,
+        shape_names,
+        [textured[row] or light != NONE for row, light in zip(rows, lights, strict=True)],
+        geometry.first_vertices,
+        framed,
     )
     others = scene_objects.gather_objects(
         by_way,
-        names,
         len(geometry.faces),
         name_of,
-        # Their textures and masks are refused, so that no numbers in the tree count.
+        # Attributes of their meshes are refused, so that no numbers in the tree count.
         lambda shape: materials.add(Surface(shape, name_of(shape), 0, 0), names),
+        lambda row: materials.uses_coordinates()[row],
         geometry.warnings,
         framed,
     )
@@ -374,6 +373,7 @@ def collect(
                 name_of(source),
                 shape,
                 meshes.rectangle_corners(geometry, shapes, shape),
+                lights[shape] if shape < len(lights) else NONE,
             )
             for source, shape in zip(sources, shape_of_emitter, strict=True)
         ),

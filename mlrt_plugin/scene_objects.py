@@ -13,12 +13,14 @@ from . import elements, meshes, parsing
 from . import mitsuba_objects as objects
 from .elements import Element
 from .errors import SceneError
+from .features import MESHES
 from .object_arrays import ANALYTIC_TYPES, GroupArrays, ObjectArrays
 from .shape_arrays import NONE, Shape
 from .texture_coordinates import gather_coordinates
 
 GROUP = "ShapeGroupPlugin"
-"""Mitsuba's class of the plugin `shapegroup`."""
+INSTANCE = "Instance"
+"""Mitsuba's classes of the plugins `shapegroup` and `instance`."""
 ROUND_ENOUGH = 1e-3
 """How much two axes of a sphere may differ, relatively; chosen."""
 
@@ -27,13 +29,14 @@ ROUND_ENOUGH = 1e-3
 class SortedShapes:
     """The shapes of a scene by the way rays meet them, in the order of declaration.
 
-    instances: with the id of their group each. groups: the shapes of each group that has
-    an instance, by its id, in the order in which they are referred to.
+    instances: what the scene says of them, with the id of their group each. groups: the
+    shapes of each group that has an instance, by its id, in the order in which they are
+    referred to.
     """
 
     meshes: list[Any] = field(default_factory=list)
     analytic: list[Any] = field(default_factory=list)
-    instances: list[tuple[Any, str]] = field(default_factory=list)
+    instances: list[tuple[Element, str]] = field(default_factory=list)
     groups: dict[str, list[Any]] = field(default_factory=dict)
 
 
@@ -43,24 +46,55 @@ def is_analytic(shape: Any) -> bool:
 
 
 def sorted_shapes(
-    shapes: list[Any], children: Mapping[str, list[Any]], names: Mapping[str, Element]
+    shapes: list[Any],
+    instances: list[Element],
+    children: Mapping[str, list[Any]],
+    names: Mapping[str, Element],
 ) -> SortedShapes:
     """Sorts loaded shapes.
 
-    children: the shapes of each group, by its id. names: elements by the ids of objects.
+    instances: see `instances_of`. children: the shapes of each group, by its id. names:
+    elements by the ids of objects.
     """
     ids = {id(element): id_ for id_, element in names.items()}
     result = SortedShapes()
     for shape in shapes:
         if is_analytic(shape):
             result.analytic.append(shape)
-        elif shape.class_name() == "Instance":
-            (group,) = (ids[id(child)] for _, child in names[shape.id()].children)
-            result.instances.append((shape, group))
-            result.groups.setdefault(group, children[group])
-        elif shape.class_name() != GROUP:
+        elif shape.class_name() not in (GROUP, INSTANCE):
             result.meshes.append(shape)
+    for element in instances:
+        (group,) = (ids[id(child)] for _, child in element.children)
+        result.instances.append((element, group))
+        result.groups.setdefault(group, children[group])
     return result
+
+
+def instances_of(parsed: parsing.ParsedScene) -> list[Element]:
+    """What a scene says of its instances, in the order of declaration."""
+    return [e for e in parsed.root.children_of("shape") if e.plugin == "instance"]
+
+
+def plain_instances(parsed: parsing.ParsedScene, of_meshes_only: bool = False) -> list[str]:
+    """Names, in the scene, of instances of which all is known without loading them: they
+    move a group that the scene declares, and say nothing else.
+
+    Mitsuba would take a tenth of a millisecond for each in an llvm variant, and much more
+    once they are in a scene. of_meshes_only: only instances of groups of triangle meshes.
+    """
+    groups = {
+        id(child)
+        for child in parsed.root.children_of("shape")
+        if child.plugin == "shapegroup"
+        and (not of_meshes_only or all(c.plugin in MESHES for _, c in child.children))
+    }
+    return [
+        name
+        for name, child in parsed.root.children
+        if child.plugin == "instance"
+        and child.properties.keys() <= {"to_world"}
+        and [id(group) in groups for _, group in child.children] == [True]
+    ]
 
 
 def group_children(
@@ -70,8 +104,9 @@ def group_children(
 
     names: elements by the ids of objects, as `parsing.instantiate` gives them.
     """
+    all_nodes = list(parsed.state.nodes)
     nodes = {
-        id_: parsed.state.nodes[int(id_[1:])]
+        id_: all_nodes[int(id_[1:])]
         for id_, element in names.items()
         if element.plugin == "shapegroup"
     }
@@ -83,19 +118,19 @@ def group_children(
 
 def gather_objects(
     scene: SortedShapes,
-    names: Mapping[str, Element],
     first_face: int,
     name_of: Callable[[Any], str],
     material_of: Callable[[Any], int],
+    uses_coordinates: Callable[[int], bool],
     warnings: list[str],
     with_coordinates: bool = False,
 ) -> ObjectArrays | None:
     """Copies what is not in the tree out of loaded shapes; None if there is nothing.
 
-    names: elements by the ids of objects. first_face: how many faces the tree has. name_of:
-    what messages call a shape. material_of: the number of a shape's material. warnings:
-    grows by a sentence on each thing that is approximated. with_coordinates: whether the
-    texture coordinates of meshes are needed.
+    first_face: how many faces the tree has. name_of: what messages call a shape.
+    material_of: the number of a shape's material. uses_coordinates: whether a material
+    needs texture coordinates. warnings: grows by a sentence on each thing that is
+    approximated. with_coordinates: whether those of all meshes are needed.
 
     Raises SceneError for a shape without an extent and for a mesh that is broken.
     """
@@ -110,9 +145,15 @@ def gather_objects(
         own_names = [name_of(shape) for shape in own]
         geometry = meshes.gather(own, own_names)
         warnings += geometry.warnings
+        rows = [material_of(shape) for shape in own]
         coordinates = gather_coordinates(
-            own, own_names, [False] * len(own), geometry.first_vertices, with_coordinates
+            own,
+            own_names,
+            [uses_coordinates(row) for row in rows],
+            geometry.first_vertices,
+            with_coordinates,
         )
+        warnings += coordinates.warnings
         groups.append(
             GroupArrays(
                 geometry.vertices,
@@ -123,12 +164,12 @@ def gather_objects(
             )
         )
         analytic += [shape for shape in children if is_analytic(shape)]
-        for number, shape in enumerate(own):
+        for number, row in enumerate(rows):
             shapes.append(
                 Shape(
                     first_face=first_face + geometry.first_faces[number],
                     face_count=geometry.face_counts[number],
-                    material=material_of(shape),
+                    material=row,
                     vertex_normals=geometry.vertex_normals[number],
                     flip_normals=geometry.flip_normals[number],
                     texture_coordinates=coordinates.present[number],
@@ -152,7 +193,7 @@ def gather_objects(
         )
         shape_names.append(name)
     numbers = {group: number for number, group in enumerate(scene.groups)}
-    maps, normals = placements(scene.instances, names)
+    maps, normals = placements([element for element, _ in scene.instances])
     return ObjectArrays(
         shapes=tuple(shapes),
         shape_names=tuple(shape_names),
@@ -187,7 +228,7 @@ def frame_of(shape: Any, name: str, warnings: list[str]) -> npt.NDArray[np.float
 
 
 def placements(
-    instances: list[tuple[Any, str]], names: Mapping[str, Element]
+    instances: list[Element],
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """(I, 3, 4) maps of points to the world and (I, 3, 3) maps of normals.
 
@@ -196,8 +237,8 @@ def placements(
     """
     maps = np.tile(np.eye(3, 4), (len(instances), 1, 1))
     normals = np.tile(np.eye(3), (len(instances), 1, 1))
-    for number, (instance, _) in enumerate(instances):
-        to_world = names[instance.id()].properties.get("to_world")
+    for number, instance in enumerate(instances):
+        to_world = instance.properties.get("to_world")
         if to_world is not None:
             maps[number] = np.array(to_world.matrix)[:3]
             normals[number] = np.array(to_world.inverse_transpose)[:3, :3]

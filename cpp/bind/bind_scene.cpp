@@ -109,7 +109,8 @@ Vec3f unit_vector(Fields &fields, const char *key) {
     return normalize(v);
 }
 
-Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_count) {
+Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_count,
+                     size_t texture_count) {
     Fields fields(dict, name);
     Emitter emitter;
     emitter.type =
@@ -134,6 +135,7 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.beam_width =
         spot ? fields.number("beam_width") : fields.number("beam_width", 0);
     emitter.shape = fields.index("shape", shape_count, NONE);
+    emitter.radiance_texture = fields.index("radiance_texture", texture_count, NONE);
     emitter.rectangle = fields.boolean("rectangle", false);
     const bool rectangle = area && emitter.rectangle;
     emitter.corner = rectangle ? fields.vector("corner") : fields.vector("corner", {});
@@ -148,6 +150,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
         refuse_value(fields.path("sampling_weight") + " must not be negative.");
     if (spot && !(emitter.beam_width <= emitter.cutoff_angle && emitter.beam_width >= 0))
         refuse_value(fields.path("beam_width") + " must be from 0 to the cut-off angle.");
+    if (emitter.radiance_texture != NONE && !rectangle)
+        refuse_value(fields.path("radiance_texture") + " is for rectangles that glow.");
     if (area && emitter.shape == NONE)
         refuse_value(fields.path("shape") + " must name the shape that glows.");
     const double volume =
@@ -208,8 +212,8 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
             shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
     double weights = 0;
     for (size_t i = 0; i < emitters.size(); ++i) {
-        scene.emitters.push_back(
-            emitter_from(emitters[i], numbered("emitters", i), shapes.size()));
+        scene.emitters.push_back(emitter_from(emitters[i], numbered("emitters", i),
+                                              shapes.size(), scene.textures.size()));
         weights += scene.emitters.back().sampling_weight;
     }
     if (!scene.emitters.empty() && !(weights > 0))

@@ -129,6 +129,16 @@ void check_texture(const SceneData &scene, const Shape &shape, const std::string
                      " has no values for.");
 }
 
+// Whether a texture, or one of its squares, has values of a mesh.
+bool is_attribute(const SceneData &scene, uint32_t number) {
+    const Texture &texture = scene.textures[number];
+    if (texture.type == TextureType::checkerboard)
+        return is_attribute(scene, texture.squares[0]) ||
+               is_attribute(scene, texture.squares[1]);
+    return texture.type == TextureType::vertex_attribute ||
+           texture.type == TextureType::face_attribute;
+}
+
 } // namespace
 
 std::vector<Texture> textures_from(const nb::list &dicts) {
@@ -147,12 +157,20 @@ void check_textures(const SceneData &scene) {
         const std::string name = numbered("shapes", i);
         const Material material =
             shape.material == NONE ? Material{} : scene.materials[shape.material];
+        const uint32_t light =
+            shape.emitter == NONE ? NONE : scene.emitters[shape.emitter].radiance_texture;
         if (is_object(scene, shape)) {
-            if (material.is_textured())
-                refuse_value(name + " has textures, but its faces are not in the tree.");
+            for (const uint32_t texture :
+                 {material.front_texture, material.back_texture, material.opacity})
+                if (texture != NONE && is_attribute(scene, texture))
+                    refuse_value(name + " shows an attribute, but its faces are not in the "
+                                        "tree.");
             continue;
         }
-        const bool textured = material.is_textured() || shape.texture_coordinates;
+        const bool textured =
+            material.is_textured() || shape.texture_coordinates || light != NONE;
+        if (light != NONE && is_attribute(scene, light))
+            refuse_value(name + " glows in an attribute of its mesh.");
         if (textured && scene.faces.empty())
             refuse_value(name + " has textures, but faces are empty.");
         for (uint32_t k = 0; k < shape.face_count && shape.texture_coordinates; ++k)

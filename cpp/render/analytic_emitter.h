@@ -47,6 +47,14 @@ Vec3<Real> from_frame(const Vec3<Real> &n, const Vec3<Real> &v) {
     return result;
 }
 
+// 1 minus the cosine of a cone. Where that closes in single precision, and Mitsuba finds no
+// light in it, half the square of the sine.
+template <typename Real>
+Real cone_opening(const Real &cosine, const Real &sine_squared) {
+    const Real opening = Real(1.0f) - cosine;
+    return select(opening > Real(0.0f), opening, Real(0.5f) * sine_squared);
+}
+
 // Uniform over the cone that the sphere fills, as seen from a point p outside of it
 // (Akalin, "Sampling the visible sphere", 2013); over the whole sphere for one inside.
 template <typename Real>
@@ -97,8 +105,8 @@ AnalyticSample<Real> sample_sphere(const AnalyticShape &sphere, bool flipped,
     const Real distance = square_root(way_2);
     const Real cosine_there = absolute(dot(way * (one / distance), sample.normal));
     const Real by_area = Real(inverse_area) * way_2 / cosine_there;
-    const Real by_cone =
-        select(distance > zero, Real(1 / TWO_PI) / (one - cosine_max), zero);
+    const Real by_cone = select(
+        distance > zero, Real(1 / TWO_PI) / cone_opening(cosine_max, sine_max_2), zero);
     sample.density = select(outside, by_cone, by_area);
     return sample;
 }

@@ -4,6 +4,7 @@
 #include "objects/trace_objects.h"
 #include "render/emitter_density.h"
 #include "render/hit_packet.h"
+#include "render/textured_light.h"
 
 #include <algorithm>
 #include <bit>
@@ -94,12 +95,14 @@ Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t fir
 Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const {
     const FloatPacket zero(0.0f);
     Vec3<FloatPacket> light = in_all_lanes({});
-    LaneArray<uint32_t> emitters;
+    LaneArray<uint32_t> emitters, shape_numbers;
     emitters.fill(NONE);
+    shape_numbers.fill(NONE);
     HitPacket hit;
     for_each_lane(hits, [&](uint32_t lane) {
         const uint32_t shape = scene_.shape_of_face[primitive_[first + lane]];
         emitters[lane] = scene_.data.shapes[shape].emitter;
+        shape_numbers[lane] = shape;
         hit.lanes |= LaneBits(emitters[lane] != NONE) << lane;
     });
     if (hit.lanes == 0)
@@ -113,21 +116,25 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
     }
     const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
     const Vec3<FloatPacket> from = vector(p_, first);
+    const UIntPacket shapes = load<UIntPacket>(shape_numbers);
     const FloatPacket own =
         load<FloatPacket>(&density_[first]) * FloatPacket(shares_.bsdfs);
     const LaneBits bright =
         hit.lanes & to_bits(dot(hit.direction, point.shading_normal) < zero);
     for_each_value(
         load<UIntPacket>(emitters), bright, [&](uint32_t emitter, LaneBits lanes) {
+            const Emission emission = emission_of(
+                scene_, emitter,
+                {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
+                lanes);
             const FloatPacket other =
-                area_density(scene_, emitter, {from, point.p, point.shading_normal}) *
+                area_density(scene_, emitter,
+                             {from, point.p, point.shading_normal, emission.density}) *
                 FloatPacket(shares_.emitters);
             const FloatPacket weight = power_heuristic(own, other);
             const auto mask = from_bits<FloatPacket>(lanes);
             for (int k = 0; k < 3; ++k)
-                light[k] = select(
-                    mask, weight * FloatPacket(scene_.data.emitters[emitter].radiance[k]),
-                    light[k]);
+                light[k] = select(mask, weight * emission.radiance[k], light[k]);
         });
     return light;
 }

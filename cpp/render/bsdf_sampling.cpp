@@ -19,8 +19,9 @@ Scattering scattering_of(const PreparedScene &scene, const HitPacket &hit,
                                         scattering.opacity);
     });
     if (scene.any_material_is_textured)
-        add_textures(scene, {hit.origin, hit.direction, hit.faces, shapes}, lanes,
-                     seen_from_front, scattering.albedo, scattering.opacity);
+        add_textures(scene,
+                     {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
+                     lanes, seen_from_front, scattering.albedo, scattering.opacity);
     return scattering;
 }
 

@@ -1,5 +1,6 @@
 #include "render/emitter_density.h"
 
+#include "render/analytic_emitter.h"
 #include "render/shadow_offset.h"
 
 #include <algorithm>
@@ -28,8 +29,8 @@ FloatPacket sphere_density(const AnalyticShape &sphere, const FloatPacket &by_ar
     const FloatPacket sine =
         FloatPacket(float(sphere.radius)) * (one / square_root(dot(way, way)));
     const FloatPacket cosine = square_root(maximum(one - sine * sine, zero));
-    const FloatPacket by_cone =
-        FloatPacket(0.5f * std::numbers::inv_pi_v<float>) / (one - cosine);
+    const FloatPacket by_cone = FloatPacket(0.5f * std::numbers::inv_pi_v<float>) /
+                                cone_opening(cosine, sine * sine);
     return select(sine < FloatPacket(ALMOST_ONE), by_cone, by_area);
 }
 
@@ -46,8 +47,7 @@ FloatPacket area_density(const PreparedScene &scene, uint32_t emitter,
     const FloatPacket squared = dot(way, way);
     const FloatPacket cosine =
         dot(way * (FloatPacket(1.0f) / square_root(squared)), hits.normal);
-    FloatPacket density =
-        FloatPacket(scene.emitter_tables[emitter].inverse_area) * (squared / -cosine);
+    FloatPacket density = hits.by_area * (squared / -cosine);
     const Shape &shape = scene.data.shapes[scene.data.emitters[emitter].shape];
     const AnalyticShape *analytic = scene.analytic(shape);
     if (analytic && analytic->type == AnalyticType::sphere)

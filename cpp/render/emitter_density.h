@@ -12,9 +12,11 @@ namespace mlrt {
 // Whether a ray can meet an emitter of the scene.
 bool emitters_can_be_hit(const PreparedScene &scene);
 
-// Points on one area light, with the normal there, seen from points `from`.
+// Points on one area light, with the normal there, seen from points `from`, and how densely
+// its samples lie there by area.
 struct LightHits {
     const Vec3<FloatPacket> &from, &p, &normal;
+    const FloatPacket &by_area;
 };
 
 // The density per solid angle at `from`, the choice of the emitter included; 0 where the

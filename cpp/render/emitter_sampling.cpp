@@ -1,6 +1,7 @@
 #include "render/emitter_sampling.h"
 
 #include "render/analytic_emitter.h"
+#include "render/textured_light.h"
 
 #include <algorithm>
 #include <cmath>
@@ -184,6 +185,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     sample.target_face = all_of<Real>(NONE);
     MaskOf<Real> has_light(true);
     Real factor = zero, by_direction(INFINITY);
+    Vec3<Real> radiance = spread<Real>(emitter.radiance);
 
     switch (emitter.type) {
     case EmitterType::point:
@@ -234,7 +236,17 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
             by_direction = light.density;
             break;
         }
-        const AreaPoint<Real> point = sample_area(scene, emitter, table, x, y);
+        AreaPoint<Real> point;
+        Real by_area(table.inverse_area);
+        if (emitter.radiance_texture != NONE) {
+            const LightPoint<Real> chosen = sample_textured_light(scene, number, x, y);
+            point = {chosen.p, spread<Real>(table.normal),
+                     all_of<Real>(scene.data.shapes[emitter.shape].first_face)};
+            by_area = chosen.density;
+            radiance = chosen.radiance;
+        } else {
+            point = sample_area(scene, emitter, table, x, y);
+        }
         const Vec3<Real> to_light = point.p - p;
         const Real squared = dot(to_light, to_light);
         const Real distance = square_root(squared);
@@ -242,7 +254,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         sample.target_face = point.face;
         sample.direction = to_light * (one / distance);
         const Real cosine = dot(sample.direction, point.normal);
-        by_direction = Real(table.inverse_area) * (squared / -cosine);
+        by_direction = by_area * (squared / -cosine);
         // False also for a point on the light itself, where the direction is not a number.
         has_light =
             (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
@@ -253,7 +265,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
     if (density)
         *density = by_direction / choice_weight;
     for (int k = 0; k < 3; ++k)
-        sample.weight[k] = select(has_light, factor * Real(emitter.radiance[k]), zero);
+        sample.weight[k] = select(has_light, factor * radiance[k], zero);
     return sample;
 }
 

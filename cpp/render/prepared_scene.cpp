@@ -111,6 +111,8 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
         table.unevenness = unevenness(scene, shape);
         const float area = parallelogram_area(emitter.edge_u, emitter.edge_v);
         table.inverse_area = area > 0 ? 1.0f / area : 0.0f;
+        if (emitter.radiance_texture != NONE)
+            table.texture = TextureSampler(scene.textures[emitter.radiance_texture]);
         // A mirrored rectangle glows on the side of its vertex normals, which is not that
         // of its edges' product.
         table.normal = shape.vertex_normals

@@ -5,6 +5,7 @@
 #include "render/distribution.h"
 #include "render/environment.h"
 #include "render/scene.h"
+#include "render/texture_sampler.h"
 
 #include <cstdint>
 #include <vector>
@@ -16,6 +17,7 @@ struct EmitterTable {
     Distribution face_areas;      // area, on a mesh but a rectangle: of its faces
     Vec3f normal{};               // rectangle, disk: unit, on the side that glows
     float inverse_area = 0;       // area: 1 / area
+    TextureSampler texture;       // area, with a texture: of its points
     float edge_scale = 1;         // area: a power of two, 1 unless the area is tiny
     float cos_cutoff = 0;         // spot
     float cos_beam = 0;           // spot

@@ -67,7 +67,9 @@ struct Emitter {
     float cutoff_angle = 0; // spot: radians, full cut-off measured from the axis
     float beam_width = 0;   // spot: radians, no fall-off inside
     uint32_t shape = NONE;  // area: the glowing shape
-    bool rectangle = false; // area: `rectangle` samples uniformly in its (u, v)
+    // area, on a rectangle: index into SceneData::textures, in place of `radiance`
+    uint32_t radiance_texture = NONE;
+    bool rectangle = false;             // area: `rectangle` samples uniformly in its (u, v)
     Vec3f corner{}, edge_u{}, edge_v{}; // rectangle: p = corner + u * edge_u + v * edge_v
     std::array<Vec3f, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // envmap: in world space
     float sampling_weight = 1; // relative probability of being chosen

@@ -34,23 +34,12 @@ int64_t floor_to_integer(float a) {
     return std::abs(a) < FAR ? int64_t(std::floor(a)) : 0;
 }
 
-// Mirror reflects every other period of the image.
-uint32_t wrapped(int64_t position, uint32_t size, WrapMode mode) {
-    if (position >= 0 && position < int64_t(size))
-        return uint32_t(position);
-    if (mode == WrapMode::clamp)
-        return position < 0 ? 0 : size - 1;
-    const int64_t period = position >= 0 ? position / size : (position + 1) / size - 1;
-    const uint32_t rest = uint32_t(position - period * size);
-    return mode == WrapMode::mirror && period % 2 != 0 ? size - 1 - rest : rest;
-}
-
 Vec3f nearest_texel(const Texture &texture, Vec2f uv) {
     const int64_t column = floor_to_integer(uv.x * float(texture.width));
     const int64_t row = floor_to_integer(uv.y * float(texture.height));
-    return value_at(texture,
-                    size_t(wrapped(row, texture.height, texture.wrap)) * texture.width +
-                        wrapped(column, texture.width, texture.wrap));
+    return value_at(texture, size_t(wrapped_texel(row, texture.height, texture.wrap)) *
+                                     texture.width +
+                                 wrapped_texel(column, texture.width, texture.wrap));
 }
 
 Vec3f bilinear(const Texture &texture, Vec2f uv) {
@@ -62,8 +51,8 @@ Vec3f bilinear(const Texture &texture, Vec2f uv) {
     const float weights_y[2] = {1.0f - bottom_weight, bottom_weight};
     uint32_t columns[2], rows[2];
     for (int k = 0; k < 2; ++k) {
-        columns[k] = wrapped(left + k, texture.width, texture.wrap);
-        rows[k] = wrapped(top + k, texture.height, texture.wrap);
+        columns[k] = wrapped_texel(left + k, texture.width, texture.wrap);
+        rows[k] = wrapped_texel(top + k, texture.height, texture.wrap);
     }
     Vec3f sum{};
     for (int j = 0; j < 2; ++j)
@@ -89,6 +78,17 @@ Vec3f interpolated(const Texture &texture, const TexturePoint &at) {
 }
 
 } // namespace
+
+// Mirror reflects every other period of the image.
+uint32_t wrapped_texel(int64_t position, uint32_t size, WrapMode mode) {
+    if (position >= 0 && position < int64_t(size))
+        return uint32_t(position);
+    if (mode == WrapMode::clamp)
+        return position < 0 ? 0 : size - 1;
+    const int64_t period = position >= 0 ? position / size : (position + 1) / size - 1;
+    const uint32_t rest = uint32_t(position - period * size);
+    return mode == WrapMode::mirror && period % 2 != 0 ? size - 1 - rest : rest;
+}
 
 Vec3f evaluate(const std::vector<Texture> &textures, uint32_t number,
                const TexturePoint &at) {

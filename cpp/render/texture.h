@@ -60,6 +60,9 @@ struct TexturePoint {
     Vec3f weights{};                    // of the vertices
 };
 
+// Where a place in a row or column of texels lies in the image, as the mode has it.
+uint32_t wrapped_texel(int64_t position, uint32_t size, WrapMode mode);
+
 // Value of a texture, one channel spread over all three. The same operations in the same
 // order as in Mitsuba 3.9 (bitmap.cpp with Dr.Jit's texture_impl.h, checkerboard.cpp,
 // mesh.h), but that weights of vertices are those of the hit and not computed anew.

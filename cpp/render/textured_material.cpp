@@ -1,5 +1,6 @@
 #include "render/textured_material.h"
 
+#include "render/object_texture.h"
 #include "render/surface.h"
 #include "render/texture.h"
 
@@ -8,7 +9,14 @@
 
 namespace mlrt {
 
-namespace {
+Vec2f mean_coordinates(const std::vector<Vec2f> &uvs,
+                       const std::array<uint32_t, 3> &vertices, Vec3f weights) {
+    const auto mean = [&](float Vec2f::*k) {
+        const auto of = [&](size_t vertex) { return uvs[vertices[vertex]].*k; };
+        return std::fma(of(2), weights.z, std::fma(of(1), weights.y, of(0) * weights.x));
+    };
+    return {mean(&Vec2f::x), mean(&Vec2f::y)};
+}
 
 // Mitsuba's mesh.cpp: without texture coordinates the weights of the vertices b and c.
 TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t face,
@@ -20,14 +28,11 @@ TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t 
     at.uv = {weight_b, weight_c};
     if (!shape.texture_coordinates)
         return at;
-    const auto mean = [&](float Vec2f::*k) {
-        const auto of = [&](int vertex) { return scene.uvs[at.vertices[vertex]].*k; };
-        return std::fma(of(2), at.weights.z,
-                        std::fma(of(1), at.weights.y, of(0) * at.weights.x));
-    };
-    at.uv = {mean(&Vec2f::x), mean(&Vec2f::y)};
+    at.uv = mean_coordinates(scene.uvs, at.vertices, at.weights);
     return at;
 }
+
+namespace {
 
 Vec3f reflectance(const SceneData &scene, const Material &material, bool front,
                   const TexturePoint &at) {
@@ -53,14 +58,29 @@ bool for_each_textured_lane(const PreparedScene &scene, const ShadedRays &rays,
     });
     if (textured == 0)
         return false;
+    const auto visit_at = [&](uint32_t lane, uint32_t shape, const TexturePoint &at) {
+        visit(lane, scene.shape_materials[shape], ((seen_from_front >> lane) & 1u) != 0,
+              at);
+    };
+    const LaneBits on_objects = lanes_on_objects(scene, rays.faces, textured);
+    for_each_lane(on_objects, [&](uint32_t lane) {
+        const ObjectHit hit =
+            ObjectHits{rays.origin, rays.direction, rays.t, rays.faces, rays.instances}.at(
+                lane);
+        visit_at(lane, scene.shape_of_face[hit.face], object_texture_point(scene, hit));
+    });
+    textured &= ~on_objects;
+    if (textured == 0)
+        return true;
     const FaceNumbers numbers = faces_in(rays.faces, textured);
     const Vec2<FloatPacket> weights =
         barycentrics_of(rays.origin, rays.direction, corners_of(scene, numbers));
     const LaneArray<float> b = to_lanes<float>(weights.x), c = to_lanes<float>(weights.y);
     for_each_lane(textured, [&](uint32_t lane) {
         const uint32_t face = numbers[lane], shape = scene.shape_of_face[face];
-        visit(lane, scene.shape_materials[shape], ((seen_from_front >> lane) & 1u) != 0,
-              texture_point(scene.data, scene.data.shapes[shape], face, b[lane], c[lane]));
+        visit_at(
+            lane, shape,
+            texture_point(scene.data, scene.data.shapes[shape], face, b[lane], c[lane]));
     });
     return true;
 }

@@ -3,8 +3,11 @@
 
 #include "base/simd.h"
 #include "render/prepared_scene.h"
+#include "render/texture.h"
 
+#include <array>
 #include <cstdint>
+#include <vector>
 
 namespace mlrt {
 
@@ -12,7 +15,18 @@ namespace mlrt {
 struct ShadedRays {
     const Vec3<FloatPacket> &origin, &direction;
     const UIntPacket &faces, &shapes;
+    // Any values in a scene without objects.
+    const FloatPacket &t;
+    const UIntPacket &instances;
 };
+
+// Texture coordinates in a triangle, by those of its vertices.
+Vec2f mean_coordinates(const std::vector<Vec2f> &uvs,
+                       const std::array<uint32_t, 3> &vertices, Vec3f weights);
+
+// A place on a face of the tree, by the weights of its second and third vertex.
+TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t face,
+                           float weight_b, float weight_c);
 
 // The given lanes of `albedo`, those of shapes with a textured material replaced.
 Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &rays,

@@ -3,6 +3,7 @@
 #include "objects/trace_objects.h"
 #include "render/emitter_density.h"
 #include "render/emitter_sampling.h"
+#include "render/textured_light.h"
 #include "render/textured_material.h"
 
 #include <algorithm>
@@ -217,8 +218,9 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
         return;
     }
     if (scene_.any_material_is_textured)
-        albedo = textured_albedo(scene_, {hit.origin, hit.direction, hit.faces, shapes},
-                                 lanes, seen_from_front, albedo);
+        albedo = textured_albedo(
+            scene_, {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
+            lanes, seen_from_front, albedo);
     lanes &= not_black(albedo);
     if (lanes == 0 || shadows_.empty())
         return;
@@ -266,10 +268,17 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
             hidden |= holders;
             return;
         }
-        const Vec3f radiance = scene_.data.emitters[number].radiance;
-        for_each_lane(holders & seen_from_front, [&](uint32_t lane) {
+        const LaneBits lit = holders & seen_from_front;
+        if (lit == 0)
+            return;
+        const Vec3<FloatPacket> radiance =
+            emission_of(
+                scene_, number,
+                {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances}, lit)
+                .radiance;
+        for_each_lane(lit, [&](uint32_t lane) {
             for (int k = 0; k < 3; ++k)
-                values_[size_t(k)][rays[lane]] += radiance[k];
+                values_[size_t(k)][rays[lane]] += radiance[k].entry(lane);
         });
     });
     if (hidden != 0) {

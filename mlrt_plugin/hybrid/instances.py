@@ -49,40 +49,36 @@ class Transform:
 
 def without_instances(
     parts: list[Any],
+    instances: list[Element],
     elements: Mapping[str, Element],
     children: Mapping[str, list[Any]],
 ) -> list[Any]:
-    """The parts of a scene with instances of meshes replaced by meshes.
+    """The parts of a scene with instances of meshes replaced by meshes, which follow the
+    other parts.
 
-    parts: objects in the order of declaration. elements: by the ids of objects.
-    children: the shapes of each group, by its id.
+    parts: objects in the order of declaration. instances: what the scene says of them,
+    whether they are among the parts or not. elements: by the ids of objects. children: the
+    shapes of each group, by its id.
 
     Groups that hold other shapes as well stay. Raises UnsupportedFeature for more faces, or
     more instances that stay, than can be dealt with.
     """
     by_element = {id(element): id_ for id_, element in elements.items()}
     transforms: dict[str, list[Transform]] = {}
-    group_of: dict[str, str] = {}
-    for part in parts:
-        element = elements.get(part.id())
-        if element is None or element.plugin != "instance":
-            continue
+    written_out = set()
+    for element in instances:
         groups = [by_element[id(child)] for _, child in element.children]
         if len(groups) != 1 or not can_be_written_out(children.get(groups[0], [])):
             continue
-        group_of[part.id()] = groups[0]
+        written_out.add(by_element[id(element)])
         transform = Transform.of(element.properties.get("to_world"))
         transforms.setdefault(groups[0], []).append(transform)
-    check_counts(parts, group_of, transforms, children)
-    result, done = [], set()
-    for part in parts:
-        group = group_of.get(part.id())
-        if group is not None and group not in done:
-            done.add(group)
-            name = str(elements[group])
-            result += [copies(m, transforms[group], name) for m in children[group]]
-        elif group is None and part.id() not in transforms:
-            result.append(part)
+    check_counts(transforms, children)
+    result = [p for p in parts if p.id() not in written_out and p.id() not in transforms]
+    check_instances(sum(part.class_name() == "Instance" for part in result))
+    for group, own in transforms.items():
+        name = str(elements[group])
+        result += [copies(mesh, own, name) for mesh in children[group]]
     return result
 
 
@@ -91,23 +87,19 @@ def can_be_written_out(shapes: list[Any]) -> bool:
 
 
 def check_counts(
-    parts: list[Any],
-    group_of: Mapping[str, str],
-    transforms: Mapping[str, list[Any]],
-    children: Mapping[str, list[Any]],
+    transforms: Mapping[str, list[Any]], children: Mapping[str, list[Any]]
 ) -> None:
-    """Raises UnsupportedFeature for scenes that are too large."""
+    """Raises UnsupportedFeature for copies that are too large together."""
     faces = sum(
         len(matrices) * sum(mesh.face_count() for mesh in children[group])
         for group, matrices in transforms.items()
     )
     if faces > LARGEST_FACE_COUNT:
+        count = sum(len(matrices) for matrices in transforms.values())
         raise UnsupportedFeature(
-            f"the scene has {len(group_of)} instances with {faces} faces in all, and they "
+            f"the scene has {count} instances with {faces} faces in all, and they "
             f"are written out: keep to {LARGEST_FACE_COUNT} faces"
         )
-    left = sum(part.class_name() == "Instance" for part in parts) - len(group_of)
-    check_instances(left)
 
 
 def check_instances(count: int) -> None:

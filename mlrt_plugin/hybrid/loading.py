@@ -12,7 +12,15 @@ import numpy as np
 
 import mlrt_llvm
 
-from .. import camera, elements, features, integrators, parsing, scene_import
+from .. import (
+    camera,
+    elements,
+    features,
+    integrators,
+    parsing,
+    scene_import,
+    scene_objects,
+)
 from .. import mitsuba_objects as objects
 from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
@@ -65,6 +73,7 @@ def load_scene(
     resolution: tuple[int, int] | None = None,
     lighting: Lighting | None = None,
     force_direct: bool = False,
+    summary: scene_import.SceneSummary | None = None,
 ) -> MitsubaScene:
     """Loads a scene; arguments as of `scene_import.import_scene`.
 
@@ -86,7 +95,10 @@ def load_scene(
                 "parameters cannot be defined for a scene that is already loaded"
             )
         return of_loaded(source, reason, sensor, resolution, lighting, force_direct)
-    parsed = scene_import.parse(source, defines, VARIANT)
+    if summary is None or summary.parsed is None or isinstance(source, Mapping):
+        parsed = scene_import.parse(source, defines, VARIANT)
+    else:
+        parsed = summary.parsed.of_variant(VARIANT)
     if parsed.config.variant != VARIANT:
         raise UnsupportedFeature(
             f"the scene holds objects of the variant {parsed.config.variant} and needs "
@@ -119,7 +131,7 @@ def load_scene(
     check_film(eye.film(), str(next(chosen.children_of("film"), chosen)))
     check_emitters(scene, {id_: str(element) for id_, element in by_id.items()})
     names = [str(by_id.get(shape.id(), shape.id())) for shape in shapes]
-    warnings += messages
+    warnings += [*messages, *small_lights(scene, shapes, names)]
     return MitsubaScene(
         scene,
         shapes,
@@ -135,17 +147,12 @@ def load_scene(
 def instantiated(parsed: parsing.ParsedScene) -> tuple[list[Any], dict[str, Element]]:
     """The parts of a scene, instances of meshes written out, and the elements by the ids of
     what they became."""
-    parts, by_id = parsing.instantiate(parsed)
-    nodes = {
-        id_: parsed.state.nodes[int(id_[1:])]
-        for id_, element in by_id.items()
-        if element.plugin == "shapegroup"
-    }
-    children = {
-        id_: [o for _, o in node.props.objects() if elements.kind_of(o) == "shape"]
-        for id_, node in nodes.items()
-    }
-    return without_instances(parts, by_id, children), by_id
+    parts, by_id = parsing.instantiate(
+        parsed, scene_objects.plain_instances(parsed, of_meshes_only=True)
+    )
+    children = scene_objects.group_children(parsed, by_id)
+    instances = scene_objects.instances_of(parsed)
+    return without_instances(parts, instances, by_id, children), by_id
 
 
 def of_loaded(
@@ -187,6 +194,7 @@ def of_loaded(
         if isinstance(part, mi.Object) and part.class_name() == GROUP
     ]
     names = [str(elements.from_object(shape)) for shape in shapes]
+    warnings += small_lights(scene, shapes, names)
     return MitsubaScene(scene, shapes, groups, eye, names, lighting, tuple(warnings))
 
 
@@ -216,6 +224,30 @@ def is_finite(value: Any) -> bool:
     except (TypeError, ValueError, RuntimeError):
         return True
     return bool(np.isfinite(numbers).all())
+
+
+def small_lights(scene: Any, shapes: list[Any], names: list[str]) -> list[str]:
+    """A sentence on each shape that glows and in which Mitsuba's plugins find no light from
+    across the scene, as its cone of directions closes in single precision, or its density
+    has no number."""
+    bounds = scene.bbox()
+    extent = float(np.max(np.array(bounds.max) - np.array(bounds.min)))
+    return [
+        f"{name} glows and is so small in a scene that measures {extent:.3g} that "
+        "Mitsuba's plugins may find no light of it: enlarge it, or choose shading = native "
+        "if the scene allows"
+        for shape, name in zip(shapes, names, strict=True)
+        if shape.emitter() is not None
+        and objects.number(shape.surface_area()) < smallest_area(shape) * extent**2
+    ]
+
+
+def smallest_area(shape: Any) -> float:
+    """Of a light, as a share of the square of its distance, from where Mitsuba finds it."""
+    if objects.plugin_name(shape) != "sphere":
+        return 1e-12  # chosen: some 1e-20 is what its disks and cylinders need
+    # 1 - sin^2 is 1 in single precision below a sine of 2^-12.5.
+    return 4 * math.pi * 2.0**-25
 
 
 def check_film(film: Any, name: str) -> None:

@@ -25,6 +25,7 @@ from ..render import (
 )
 from ..samplers import checked_spp, own_spp, rounded
 from ..scene_arrays import Lighting, same_geometry
+from ..scene_import import SceneSummary
 from ..shading_choice import ShadingChoice
 from ..tree_cache import ObtainedTree, obtain_tree
 from ..tree_report import tree_report
@@ -198,6 +199,7 @@ def prepare_hybrid(
     previous: Any = None,
     tree_cache: str | os.PathLike[str] | None = None,
     build: dict[str, Any],
+    summary: SceneSummary | None = None,
 ) -> PreparedHybrid:
     """Loads a scene in Mitsuba and builds a tree of its meshes; arguments as of `prepare`.
 
@@ -212,6 +214,7 @@ def prepare_hybrid(
         resolution=resolution,
         lighting=lighting,
         force_direct=force_direct,
+        summary=summary,
     )
     faces = mesh_faces(loaded.shapes, loaded.names)
     others = other_shapes(loaded.shapes, loaded.groups)

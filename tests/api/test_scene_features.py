@@ -43,12 +43,18 @@ def test_approximations_are_named(
 UNSUPPORTED = {
     "sphere": {
         "shapes": '<shape type="sphere" id="ball"><bsdf type="diffuse">'
-        '<texture type="checkerboard" name="reflectance"/></bsdf></shape>'
+        '<texture type="mesh_attribute" name="reflectance">'
+        '<string name="name" value="vertex_color"/></texture></bsdf></shape>'
     },
     "shapegroup": {
         "shapes": '<shape type="shapegroup" id="group"><shape type="cube">'
-        '<bsdf type="mask"><bsdf type="diffuse"/></bsdf></shape></shape>'
+        '<bsdf type="diffuse"><texture type="mesh_attribute" name="reflectance">'
+        '<string name="name" value="vertex_color"/></texture></bsdf></shape></shape>'
         '<shape type="instance"><ref id="group"/></shape>'
+    },
+    "spot": {
+        "emitters": '<emitter type="spot"><transform name="to_world"><scale value="2"/>'
+        "</transform></emitter>"
     },
     "sdfgrid": {"shapes": '<shape type="sdfgrid" id="ball"/>'},
     "sunsky": {"emitters": '<emitter type="sunsky" id="sky"/>'},
@@ -63,7 +69,17 @@ UNSUPPORTED = {
     },
     "area": {
         "shapes": '<shape type="rectangle"><emitter type="area" id="screen">'
+        '<texture type="mesh_attribute" name="radiance">'
+        '<string name="name" value="vertex_color"/></texture></emitter></shape>'
+    },
+    "cube": {
+        "shapes": '<shape type="cube" id="screen"><emitter type="area">'
         '<texture type="checkerboard" name="radiance"/></emitter></shape>'
+    },
+    "rectangle": {
+        "shapes": '<shape type="rectangle" id="screen"><emitter type="area">'
+        '<texture type="checkerboard" name="radiance"/></emitter>'
+        '<boolean name="flip_normals" value="true"/></shape>'
     },
     "roughconductor": {
         "shapes": '<shape type="cube"><bsdf type="roughconductor" id="tin"/></shape>'

@@ -41,6 +41,20 @@ def test_names_are_derived(
     assert capsys.readouterr().err == ""
 
 
+def test_all_sensors(scene_file: SceneFile, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of each scene as many as it has; one that cannot be read does not keep the others."""
+    one = scene_file("one.xml")
+    two = scene_file("two.xml", sensor=scene_files.SENSOR + WIDE)
+    broken = scene_file("broken.xml", shapes="<shape")
+    assert main(["render", str(one), str(broken), str(two), "-s", "all"]) == 1
+    names = sorted(path.name for path in one.parent.glob("*.exr"))
+    assert names == ["one.exr", "two-0.exr", "two-1.exr"]
+    assert image(one.with_name("two-1.exr")).shape[1] == 24
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == f"mlrt: error: 1 of 4 images failed: {broken}"
+    assert len(lines) == 2
+
+
 def test_the_others_are_rendered_if_one_fails(
     scene_file: SceneFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -81,6 +95,8 @@ def test_images_may_not_overwrite_one_another(
     assert not list(tmp_path.glob("*.exr"))
     assert main(["render", str(path), str(other), "-o", str(tmp_path / "absent")]) == 1
     assert "folder that exists" in capsys.readouterr().err
+    assert main(["render", str(path), str(other.parent / ".." / path.name)]) == 1
+    assert "would both be written" in capsys.readouterr().err
 
 
 def test_shading_is_told(scene_file: SceneFile, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,8 +15,10 @@ from object_sets import closest, object_set
 from oracles import Soup
 
 import mlrt_plugin
-from mlrt_plugin import SceneError
+from mlrt_plugin import SceneError, scene_objects
 from mlrt_plugin._dispatch import core
+from mlrt_plugin.parsing import instantiate
+from mlrt_plugin.scene_import import parse
 
 Array = npt.NDArray[Any]
 
@@ -192,3 +194,45 @@ def test_ellipsoids_are_told_of(tmp_path: Path) -> None:
     )
     scene = mlrt_plugin.prepare(path, shading="native")
     assert any("'egg'" in text and "ellipsoid" in text for text in scene.warnings)
+
+
+MOVED = '<transform name="to_world"><translate x="{}"/></transform>'
+
+
+@pytest.mark.parametrize("shading", ["native", "mitsuba"])
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        ('<ref id="group"/><float name="speed" value="1"/>', "unreferenced property"),
+        ('<ref id="group"/><bsdf type="diffuse"/>', "Only a shapegroup can be specified"),
+        ('<ref id="group"/><ref id="other"/>', "Only a single shapegroup"),
+        ("", "'shapegroup' must be specified"),
+    ],
+)
+def test_instances_that_say_more_are_refused(
+    scene_file: Any, shading: str, content: str, complaint: str
+) -> None:
+    other = '<shape type="shapegroup" id="other"><shape type="cube"/></shape>'
+    shapes = GROUP + other + f'<shape type="instance">{content}</shape>'
+    with pytest.raises(SceneError, match=complaint) as error:
+        mlrt_plugin.prepare(scene_file(shapes=shapes), shading=shading)
+    assert "instance" in str(error.value) and str(error.value).count("\n") == 0
+
+
+def test_instances_are_not_loaded_one_by_one(scene_file: Any) -> None:
+    """Mitsuba loads none of a scene that only moves groups, and the places are right."""
+    many = "".join(
+        f'<shape type="instance"><ref id="group"/>{MOVED.format(x)}</shape>'
+        for x in range(50)
+    )
+    path = scene_file(shapes=scene_files.FLOOR + many + GROUP)
+    parsed = parse(path, None)
+    names = scene_objects.plain_instances(parsed)
+    parts, _ = instantiate(parsed, names)
+    assert len(names) == 50
+    assert not any(part.class_name() == "Instance" for part in parts)
+    scene = mlrt_plugin.prepare(path, shading="native")
+    assert isinstance(scene, mlrt_plugin.PreparedScene)
+    origins = [[x + 0.25, 9, 0] for x in (0, 3, 49)]
+    hits = scene.closest_hit(origins, [[0, -1, 0]] * 3)
+    assert hits.instance.tolist() == [0, 3, 49]

@@ -137,13 +137,23 @@ def test_textures_need_faces(folder: Path) -> None:
         core.Scene(**arguments)
 
 
-def test_textures_need_faces_of_the_tree(folder: Path) -> None:
-    arguments = arguments_with(folder, [CONSTANT])
-    count = sum(shape["face_count"] for shape in arguments["shapes"])
+def test_attributes_need_faces_of_the_tree(folder: Path) -> None:
+    count = sum(
+        shape["face_count"] for shape in arguments_with(folder, [CONSTANT])["shapes"]
+    )
+    values = np.ones((count + 1, 3), np.float32)
+    attribute = {
+        "type": "face_attribute",
+        "first": 0,
+        "channels": 3,
+        "texels": values,
+        "decoded": None,
+    }
+    arguments = arguments_with(folder, [attribute])
     ball = {"first_face": count, "face_count": 1, "material": 0}
     arguments["shapes"] = [*arguments["shapes"], ball]
     arguments["objects"] = object_set([0], [np.eye(3, 4)], first_face=count)
-    message = "has textures, but its faces are not in the tree"
+    message = "shows an attribute, but its faces are not in the tree"
     with pytest.raises(ValueError, match=message):
         core.Scene(**arguments)
     core.Scene(**arguments | {"material_textures": None})

@@ -134,6 +134,18 @@ def make_parser() -> Parser:
     )
     order.set_defaults(run=run_order)
     add_shared_options(order, repeats=5, scenes="office,conference")
+    features = commands.add_parser(
+        "features",
+        help="what features cost that a picture does not use",
+        description="Renders scenes in turns with a small shape out of sight that is plain "
+        "or has a texture, vertex normals, a mask or a light, and compares the time of the "
+        "processor. On the first number of threads.",
+    )
+    features.set_defaults(run=run_features)
+    add_shared_options(features, repeats=30, scenes="office,cornell-box")
+    features.add_argument(
+        "--spp", type=count, default=4, metavar="N", help="samples a pixel (%(default)s)"
+    )
     watertight = commands.add_parser(
         "watertight",
         help="rays at vertices and edges of closed meshes, of which none may escape",
@@ -280,6 +292,12 @@ def run_tiles(options: argparse.Namespace) -> bool:
 
 def run_order(options: argparse.Namespace) -> bool:
     from .order_command import run
+
+    return run(options)
+
+
+def run_features(options: argparse.Namespace) -> bool:
+    from .features_command import run
 
     return run(options)
 
