@@ -346,12 +346,15 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
 }
 
-// Asks for the cache lines of an object that will be read soon.
+// Asks for the cache lines of an object that will be read soon: one, if objects of its size
+// fill lines.
+inline constexpr size_t CACHE_LINE = 64;
 template <typename Object>
 void prefetch(const Object *object) {
     const char *bytes = reinterpret_cast<const char *>(object);
     __builtin_prefetch(bytes);
-    __builtin_prefetch(bytes + sizeof(Object) - 1);
+    if constexpr (CACHE_LINE % sizeof(Object) != 0)
+        __builtin_prefetch(bytes + sizeof(Object) - 1);
 }
 
 // The same vector in all lanes.
