@@ -26,7 +26,7 @@ BOX = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
 def test_pictures_are_the_same() -> None:
     times = measure_features(BOX, 32, 1, 2)
     assert [each.feature for each in times] == list(FEATURES)
-    assert all(each.same and len(each.seconds) == 2 for each in times)
+    assert all(each.differing == 0 and len(each.seconds) == 2 for each in times)
 
 
 def test_each_scene_has_its_feature_and_no_other(tmp_path: Path) -> None:
