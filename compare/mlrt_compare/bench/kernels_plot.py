@@ -8,6 +8,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from .table import plural
 
@@ -115,6 +116,10 @@ def draw_shadows(
             facecolors=[colour] if row["offset"] == "robust" else "none",
         )
     axes.set_xscale("log")
+    # On less than two decades every tick would have its number.
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_yscale("symlog", linthresh=1)
     axes.set_ylim(-0.4, max(2 * axes.get_ylim()[1], 10))
     axes.grid(True, alpha=0.25)
