@@ -11,6 +11,7 @@ import mitsuba as mi
 import pytest
 import repository
 import scene_files
+from mitsuba_worker import MitsubaWorker, Unavailable
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -51,6 +52,18 @@ def scene_file(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def mitsuba_llvm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MitsubaWorker]:
+    """Mitsuba's llvm_ad_rgb in a process beside, for references; skips by name where it
+    finds no libLLVM."""
+    try:
+        worker = MitsubaWorker(tmp_path_factory.mktemp("mitsuba"))
+    except Unavailable as error:
+        pytest.skip(f"Mitsuba's llvm_ad_rgb: {error}")
+    yield worker
+    worker.close()
 
 
 @pytest.fixture

@@ -125,8 +125,18 @@ def add_output_options(parser: argparse.ArgumentParser, what: str) -> None:
         metavar="DIR",
         help=f"folder for {what}, made if its parent exists",
     )
+    add_json(parser)
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write all figures there"
+    )
+
+
+def add_table(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--table", type=Path, metavar="FILE", help="write a table in Markdown there"
     )
 
 

@@ -17,7 +17,9 @@ from .options import (
     PASSED,
     PROGRAM,
     Parser,
+    add_json,
     add_scene_choices,
+    add_table,
     at_least,
     check_json,
     settings_of,
@@ -26,8 +28,8 @@ from .options import (
 )
 from .scene_files import common_folder, scenes_in, short_names, told_from
 from .settings import Settings
+from .shading_paths import on_each_path
 
-PATHS = ("native", "mitsuba")
 PLACE = re.compile(r"( with id '[^']*')? at \S+ line [\d:]+")
 """Of an element in a message; the table says the scene already."""
 Row = dict[str, Any]
@@ -49,7 +51,8 @@ def run(arguments: Sequence[str]) -> int:
     rows: list[Row] = []
     code = PASSED
     for scene, name in zip(scenes, short_names(scenes), strict=True):
-        for settings, choice in paths_of(settings_of(options, scene, options.spp)):
+        on_paths, choice = paths_of(settings_of(options, scene, options.spp))
+        for settings in on_paths:
             row: Row = {"name": name, "path": settings.shading, "auto": choice}
             try:
                 row |= parity(settings).as_dict()
@@ -74,24 +77,15 @@ def run(arguments: Sequence[str]) -> int:
     return code
 
 
-def paths_of(settings: Settings) -> list[tuple[Settings, str]]:
-    """The scene on each of the paths that it can take, and what `auto` says of it."""
+def paths_of(settings: Settings) -> tuple[list[Settings], str]:
+    """As `on_each_path`, but once for a scene that cannot be read."""
     from mlrt_plugin.errors import MlrtError
-    from mlrt_plugin.parsing import resolving_from
-    from mlrt_plugin.shading_choice import choose_shading
 
     try:
-        with resolving_from(*settings.folders):
-            chosen = choose_shading(
-                settings.scene, sensor=settings.sensor, defines=settings.defines
-            )
+        return on_each_path(settings)
     except MlrtError:
         # Rendering it tells why.
-        return [(dataclasses.replace(settings, shading="auto"), "")]
-    paths = ("mitsuba",) if chosen.path == "mitsuba" else PATHS
-    if settings.shading is not None:
-        paths = (settings.shading,)
-    return [(dataclasses.replace(settings, shading=path), str(chosen)) for path in paths]
+        return [dataclasses.replace(settings, shading="auto")], ""
 
 
 def tell(row: Row) -> None:
@@ -164,10 +158,6 @@ def parity_parser() -> argparse.ArgumentParser:
     )
     add_scene_choices(parser)
     parser.add_argument("--spp", type=at_least(1), help="samples a pixel (the scene's)")
-    parser.add_argument(
-        "--table", type=Path, metavar="FILE", help="write a table in Markdown there"
-    )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="also write all figures there"
-    )
+    add_table(parser)
+    add_json(parser)
     return parser

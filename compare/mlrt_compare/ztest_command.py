@@ -21,6 +21,7 @@ from .options import (
     Parser,
     add_output_options,
     add_scene_choices,
+    add_table,
     at_least,
     check_json,
     check_output_folder,
@@ -30,6 +31,7 @@ from .options import (
 )
 from .scene_files import common_folder, scenes_in, told_from
 from .settings import Settings
+from .shading_paths import on_each_path
 
 if TYPE_CHECKING:
     from .scalar_reference import Reference
@@ -166,13 +168,7 @@ def settings_of_paths(options: argparse.Namespace, scene: Path) -> list[Settings
     settings = settings_of(options, scene, options.spp)
     if not options.each_path:
         return [settings]
-    from mlrt_plugin.parsing import resolving_from
-    from mlrt_plugin.shading_choice import choose_shading
-
-    with resolving_from(*settings.folders):
-        chosen = choose_shading(scene, sensor=settings.sensor, defines=settings.defines)
-    paths = ("mitsuba",) if chosen.path == "mitsuba" else ("native", "mitsuba")
-    return [dataclasses.replace(settings, shading=path) for path in paths]
+    return on_each_path(dataclasses.replace(settings, shading=None))[0]
 
 
 def judge_scene(settings: Settings, options: argparse.Namespace) -> Judged:
@@ -351,9 +347,7 @@ def ztest_parser() -> argparse.ArgumentParser:
         action="store_true",
         help="test the image of each path that can render a scene, native and mitsuba",
     )
-    parser.add_argument(
-        "--table", type=Path, metavar="FILE", help="write a table in Markdown there"
-    )
+    add_table(parser)
     parser.add_argument(
         "--authored",
         action="store_true",

@@ -346,9 +346,10 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
 }
 
+inline constexpr size_t CACHE_LINE = 64;
+
 // Asks for the cache lines of an object that will be read soon: one, if objects of its size
 // fill lines.
-inline constexpr size_t CACHE_LINE = 64;
 template <typename Object>
 void prefetch(const Object *object) {
     const char *bytes = reinterpret_cast<const char *>(object);

@@ -4,6 +4,7 @@
 #include "base/simd.h"
 #include "traverse/load_packet.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 

@@ -160,8 +160,7 @@ void BsdfRays::trace(const TraceOptions &options, Counters &counters, float *cos
         return;
     find_hits(options, counters, cost);
     for (size_t first = 0; first < count_; first += PACKET_WIDTH) {
-        const LaneBits lanes =
-            count_ - first < PACKET_WIDTH ? (1u << (count_ - first)) - 1 : ALL_LANES;
+        const LaneBits lanes = first_lanes(count_ - uint32_t(first));
         LaneBits misses = 0;
         for_each_lane(lanes, [&](uint32_t lane) {
             const bool miss = scene_.any_shape_glows

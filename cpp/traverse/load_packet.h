@@ -4,9 +4,6 @@
 #include "geometry/ray_packet.h"
 #include "traverse/ray_group.h"
 
-#include <algorithm>
-#include <array>
-
 namespace mlrt {
 
 // A packet, and the lanes that need a traversal of their own because a direction component

@@ -1,13 +1,11 @@
-"""Mitsuba in two variants: scalar_rgb here, llvm_ad_rgb in a process beside."""
+"""The variant of Mitsuba that scenes are read in, and where they are written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import mitsuba as mi
 import pytest
-from mitsuba_worker import MitsubaWorker, Unavailable
 
 
 @pytest.fixture(autouse=True)
@@ -17,16 +15,5 @@ def scalar_variant() -> None:
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the scenes' mesh files and the reference pictures go."""
+    """Where the scenes' mesh files go."""
     return tmp_path_factory.mktemp("render")
-
-
-@pytest.fixture(scope="session")
-def mitsuba_llvm(folder: Path) -> Iterator[MitsubaWorker]:
-    """Skips by name where Mitsuba finds no libLLVM."""
-    try:
-        worker = MitsubaWorker(folder)
-    except Unavailable as error:
-        pytest.skip(f"Mitsuba's llvm_ad_rgb: {error}")
-    yield worker
-    worker.close()

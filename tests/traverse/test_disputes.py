@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ import oracles
 import pytest
 import workloads
 from adjudication import Judgement, Verdict, adjudicate
-from mitsuba_worker import MitsubaWorker, Unavailable
+from mitsuba_worker import MitsubaWorker
 from tracing import Hits, build, closest
 
 from mlrt_plugin._dispatch import core
@@ -24,17 +23,6 @@ MESHES = {
     ),
     "fan": workloads.fan(),
 }
-
-
-@pytest.fixture(scope="module")
-def mitsuba_llvm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[MitsubaWorker]:
-    """Skips by name where Mitsuba finds no libLLVM."""
-    try:
-        worker = MitsubaWorker(tmp_path_factory.mktemp("hits"))
-    except Unavailable as error:
-        pytest.skip(f"Mitsuba's llvm_ad_rgb: {error}")
-    yield worker
-    worker.close()
 
 
 def rays_at_features(rng: np.random.Generator, scene: workloads.Scene) -> workloads.Rays:

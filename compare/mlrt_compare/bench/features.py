@@ -1,8 +1,8 @@
 """What features of a scene cost where its picture does not use them.
 
-A small shape is put into a scene, hidden in the middle of a larger one. Where it has the
-feature, all that the renderer switches on for it is on, and no ray that counts meets it;
-where it is plain, nothing is. The picture is the same, and the times should be.
+A tiny cube is put below everything else in a scene. Where it has the feature, all that the
+renderer switches on for it is on, and no ray meets it that changes the picture; where it is
+plain, nothing is. The picture is the same, and the times should be.
 """
 
 from __future__ import annotations
