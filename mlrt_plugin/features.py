@@ -81,7 +81,8 @@ def reason_against(element: Element) -> str:
     if plugin in ("spot", "directional") and scales(element.properties.get("to_world")):
         return "its to_world scales, which is not supported yet"
     textures = [child.plugin for child in element.children_of("texture")]
-    if kind == "emitter" and set(textures) & set(VARYING) - set(LIGHT_TEXTURES):
+    nested = {part.plugin for part in element.walk()}
+    if kind == "emitter" and nested & set(VARYING) - set(LIGHT_TEXTURES):
         return f"of textures it can have {', '.join(LIGHT_TEXTURES)} only so far"
     if kind == "shape" and textures:
         return "textures that are attributes of a shape are not supported yet"

@@ -24,6 +24,7 @@ from .. import (
 from .. import mitsuba_objects as objects
 from ..elements import Element
 from ..errors import SceneError, UnsupportedFeature
+from ..object_arrays import ANALYTIC_TYPES
 from ..scene_arrays import Lighting
 from .instances import check_instances, without_instances
 from .light_scene import light_scene
@@ -238,6 +239,7 @@ def small_lights(scene: Any, shapes: list[Any], names: list[str]) -> list[str]:
         "if the scene allows"
         for shape, name in zip(shapes, names, strict=True)
         if shape.emitter() is not None
+        and (shape.is_mesh() or objects.plugin_name(shape) in ("rectangle", *ANALYTIC_TYPES))
         and objects.number(shape.surface_area()) < smallest_area(shape) * extent**2
     ]
 

@@ -69,8 +69,9 @@ UNSUPPORTED = {
     },
     "area": {
         "shapes": '<shape type="rectangle"><emitter type="area" id="screen">'
-        '<texture type="mesh_attribute" name="radiance">'
-        '<string name="name" value="vertex_color"/></texture></emitter></shape>'
+        '<texture type="checkerboard" name="radiance">'
+        '<texture type="mesh_attribute" name="color0">'
+        '<string name="name" value="vertex_color"/></texture></texture></emitter></shape>'
     },
     "cube": {
         "shapes": '<shape type="cube" id="screen"><emitter type="area">'
