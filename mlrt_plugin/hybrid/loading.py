@@ -239,7 +239,9 @@ def small_lights(scene: Any, shapes: list[Any], names: list[str]) -> list[str]:
         "if the scene allows"
         for shape, name in zip(shapes, names, strict=True)
         if shape.emitter() is not None
-        and (shape.is_mesh() or objects.plugin_name(shape) in ("rectangle", *ANALYTIC_TYPES))
+        and (
+            shape.is_mesh() or objects.plugin_name(shape) in ("rectangle", *ANALYTIC_TYPES)
+        )
         and objects.number(shape.surface_area()) < smallest_area(shape) * extent**2
     ]
 
