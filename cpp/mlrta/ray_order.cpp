@@ -26,7 +26,7 @@ constexpr uint32_t CELL_BITS = 10;
 
 // Bits of a cell's number to leave out, so that a cell holds about SHARING rays.
 uint32_t dropped_bits(uint32_t count) {
-    constexpr uint32_t SHARING = 64; // chosen from 16 to 1024 by area lights and skies
+    constexpr uint32_t SHARING = 64; // chosen from 4, 16 and 256 by area lights and skies
     return 2 * CELL_BITS -
            std::min<uint32_t>(std::bit_width(count / SHARING), 2 * CELL_BITS);
 }

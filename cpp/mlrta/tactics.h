@@ -38,7 +38,8 @@ public:
     }
 
 private:
-    // In nanoseconds, fitted to incoherent rays in office, conference and sponza (AVX-512).
+    // In nanoseconds, fitted to rays to area lights and skies in conference and sponza
+    // (AVX-512).
     static constexpr float PACKET_STEP = 20, PACKET_TEST = 25;
     static constexpr float SINGLE_RAY = 50, SINGLE_STEP = 10, SINGLE_TEST = 8;
     static constexpr uint32_t CHECK_EVERY = 32;

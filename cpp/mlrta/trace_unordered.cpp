@@ -11,7 +11,7 @@ namespace mlrt {
 namespace {
 
 bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
-    return rays.count <= RayOrder::MOST_RAYS &&
+    return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
 }
@@ -49,7 +49,6 @@ struct OrderedRays {
         }
         group.t_min = t_min.data();
         group.t_max = t_max.data();
-        group.cost = nullptr;
     }
     OrderedRays(const OrderedRays &) = delete;
     OrderedRays &operator=(const OrderedRays &) = delete;

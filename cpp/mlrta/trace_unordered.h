@@ -12,7 +12,7 @@ namespace mlrt {
 uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays);
 
 // Both sort the rays if that makes beams of neighbours much narrower. Others stay in their
-// order.
+// order, and so do those whose costs are asked for.
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters);

@@ -66,19 +66,14 @@ void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float 
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();
     }
-    // Rays that are sorted have no costs.
-    const auto any = cost ? trace_any : trace_any_unordered;
     const SceneData &scene = scene_.data;
     if (!scene_.any_shape_glows) {
-        any(*scene.tree, rays, options, blocked_.data(), counters);
+        trace_any_unordered(*scene.tree, rays, options, blocked_.data(), counters);
         if (scene.objects)
             trace_any_objects(*scene.objects, rays, blocked_.data(), counters);
     } else {
         const HitGroup hits{scene.objects ? t_.data() : nullptr, primitive_.data()};
-        if (cost)
-            trace_closest(*scene.tree, rays, options, hits, counters);
-        else
-            trace_closest_unordered(*scene.tree, rays, options, hits, counters);
+        trace_closest_unordered(*scene.tree, rays, options, hits, counters);
         if (scene.objects)
             trace_closest_objects(*scene.objects, rays,
                                   {hits.t, hits.primitive, instance_.data()}, counters);

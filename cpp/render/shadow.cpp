@@ -77,7 +77,7 @@ void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &optio
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();
     }
-    if (from_light_ || cost)
+    if (from_light_)
         trace_any(*scene.tree, rays, options, occluded_.data(), counters);
     else
         trace_any_unordered(*scene.tree, rays, options, occluded_.data(), counters);
