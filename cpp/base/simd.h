@@ -394,10 +394,4 @@ inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
 template <typename Real>
 using DoubleOf = decltype(to_double(std::declval<Real>()));
 
-// Keeps denormal numbers while it lives: Dr.Jit's threads flush them to zero.
-class KeepDenormals {
-private:
-    drjit::scoped_flush_denormals scope_{false};
-};
-
 } // namespace mlrt

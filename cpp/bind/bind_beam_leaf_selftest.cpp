@@ -1,4 +1,5 @@
 // What the tests ask of the parts of the beam-leaf traversal.
+#include "base/denormals.h"
 #include "bind/bind.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/regroup.h"
