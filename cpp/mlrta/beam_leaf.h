@@ -21,7 +21,8 @@ struct BeamMemory {
     BeamMemory(const KdTree &tree, Vec3f origin) : distances(tree, origin) {}
 
     HitDistances distances;
-    float triangles_per_ray = 0; // tested against the beam; a moving average
+    BeamPackets beam;            // the one that is traced
+    float triangles_per_ray = 0; // tested against beams; a moving average
 
     // Triangles that stopped rays of the last beam, of Query::any: they are likely to stop
     // those of the next one too, and tested first.

@@ -65,13 +65,12 @@ public:
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
-    LaneBits touched_packets(const TriangleForms &forms, uint32_t lane) const;
     bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
     void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                 uint32_t primitive);
-    void update_least(LaneBits packets);
+    void update_least(uint64_t packets);
     void update_least();
 
     const KdTree &tree_;
@@ -83,10 +82,10 @@ private:
     uint32_t tested_ = 0;
     bool dense_ = false; // whether there are many triangles
     RayGrid grid_;       // where there are
-    // Packets of the beam that triangles of a block may touch: PACKET_WIDTH times the
+    // Packets of the beam that triangles of a block may touch: its CAPACITY times the
     // number of the triangle plus that of the packet. What is written there comes in whole
     // packets.
-    std::array<uint32_t, (WIDE_WIDTH + 1) * PACKET_WIDTH> pairs_;
+    std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
     std::array<uint32_t, WIDE_WIDTH> hit_;
