@@ -190,21 +190,25 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             if (tests_.spent())
                 return false;
         }
-        do {
+        for (;;) {
             if (pending == 0)
                 tests_.flush();
             if (pending == 0 || tests_.all_done())
                 return true;
-            --pending;
-        } while (stack[pending].depths.near > tests_.far_end());
-        const Pending &next = stack[pending];
-        while (changed > next.changes) {
-            --changed;
-            cell_[changes[changed].bound] = changes[changed].before;
+            const Pending &next = stack[--pending];
+            if (next.depths.near > tests_.far_end())
+                continue;
+            while (changed > next.changes) {
+                --changed;
+                cell_[changes[changed].bound] = changes[changed].before;
+            }
+            change(next.bound, next.split);
+            if (beside())
+                continue;
+            node = tree_.node(next.node);
+            depths = next.depths;
+            break;
         }
-        change(next.bound, next.split);
-        node = tree_.node(next.node);
-        depths = next.depths;
     }
 }
 
