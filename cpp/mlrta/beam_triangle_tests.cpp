@@ -21,6 +21,18 @@ Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
 }
 
+// Whether two triangles, if both have an area, certainly lie in one plane: one across an
+// axis, or that of the same three vertices. Surfaces that were modelled twice do.
+bool in_one_plane(const Triangle &one, const Triangle &other) {
+    for (int k = 0; k < 3; ++k) {
+        const float at = one.a[k];
+        if (one.b[k] == at && one.c[k] == at)
+            return other.a[k] == at && other.b[k] == at && other.c[k] == at;
+    }
+    const auto is_of_one = [&](Vec3f v) { return v == one.a || v == one.b || v == one.c; };
+    return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
+}
+
 } // namespace
 
 template <Query query>
@@ -160,6 +172,18 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                                       LaneBits certain_hits, uint32_t primitive) {
+    // In one plane a ray has one distance, and the lower number wins.
+    LaneBits tied = 0;
+    for_each_value(packet.primitive, lanes & packet.found,
+                   [&](uint32_t rival, LaneBits holders) {
+                       if (rival != primitive && !in_one_plane(tree_.triangles[rival],
+                                                               tree_.triangles[primitive]))
+                           return;
+                       if (primitive < rival)
+                           tied |= holders;
+                       else
+                           lanes &= ~holders;
+                   });
     counters_.double_tests += uint64_t(std::popcount(lanes));
     LaneBits hits = lanes & certain_hits;
     for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
@@ -169,13 +193,16 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
+    const UIntPacket number(primitive);
+    tied &= hits;
+    packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
+    hits &= ~tied;
     if (hits == 0)
         return;
 
     const auto distances = [&](LaneBits of, const UIntPacket &primitives) {
         return distances_.of(rays_, packet.first_ray, of, primitives, counters_);
     };
-    const UIntPacket number(primitive);
     const FloatPacket t = distances(hits, number);
     const FloatPacket t_min = load_padded(rays_.t_min, packet.first_ray, rays_.count);
     const FloatPacket t_max = load_padded(rays_.t_max, packet.first_ray, rays_.count);

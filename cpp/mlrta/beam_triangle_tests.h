@@ -31,7 +31,7 @@ public:
     }
 
 private:
-    static constexpr uint32_t SIZE = 64;
+    static constexpr uint32_t SIZE = 512;
     std::array<uint32_t, SIZE> entries_;
 };
 

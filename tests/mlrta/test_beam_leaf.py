@@ -283,3 +283,30 @@ def test_few_rays_among_many_triangles(core: ModuleType) -> None:
         tree.closest_hit(*rays, *interval(rays, 0, np.inf), options, counters)
         assert counters["beams"] > 0
         assert (counters["fallbacks"] > 0) == given_up
+
+
+@each_core
+def test_surfaces_that_lie_in_one_plane(core: ModuleType) -> None:
+    """Equal distances go to the lowest number, whichever triangle a beam meets first."""
+    rng = np.random.default_rng(SEED)
+    any_plane = rng.uniform(-1, 1, (30, 3, 3))
+    any_plane[:, :, 2] += 4
+    across = rng.uniform(-1, 1, (30, 3, 3))
+    across[:, :, 2] = rng.choice([3, 3.5], (30, 1))
+    triangles = np.concatenate([any_plane, across]).astype(np.float32)
+    nearly = triangles.copy()
+    nearly[:, 1, 2] = np.nextafter(nearly[:, 1, 2], np.float32(9))
+    scene = np.concatenate([triangles, triangles[:, [1, 2, 0]], triangles[:, ::-1], nearly])
+    scene = scene[rng.permutation(len(scene))]
+    faces = np.arange(3 * len(scene), dtype=np.uint32).reshape(-1, 3)
+    tree = build(core, (np.ascontiguousarray(scene.reshape(-1, 3)), faces))
+    directions = np.asarray(rng.uniform(-0.3, 0.3, (3000, 3)), np.float32)
+    directions[:, 2] = 1
+    rays = np.zeros_like(directions), directions
+    expected = closest(tree, rays, BRUTE_FORCE)
+    assert np.count_nonzero(expected.face >= 0) > 1000, SEED
+    for options in (BEAM_LEAF, ADAPTIVE):
+        closest(tree, rays, options).assert_same(expected)
+    counters: dict[str, int] = {}
+    tree.closest_hit(*rays, *interval(rays, 0, np.inf), BEAM_LEAF, counters)
+    assert counters["double_tests"] > 1000, SEED
