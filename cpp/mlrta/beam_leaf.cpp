@@ -218,8 +218,8 @@ template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
                      Counters &counters) {
-    BeamTriangleTests<query> tests(tree, rays, memory.distances, most_triangles, beam,
-                                   counters);
+    BeamTriangleTests<query> tests(tree, rays, memory.distances, memory.mailbox,
+                                   most_triangles, beam, counters);
     bool done = true;
     if (memory.occluder_count > 0)
         tests.test_first({memory.occluders.data(), memory.occluder_count});

@@ -6,6 +6,7 @@
 #include "kdtree/tree.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/hit_distances.h"
+#include "mlrta/mailbox.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/triangle_forms.h"
 #include "traverse/query.h"
@@ -16,34 +17,17 @@
 
 namespace mlrt {
 
-// Triangles that a beam has been tested against, as far as a small direct-mapped table
-// remembers them.
-class Mailbox {
-public:
-    Mailbox() { entries_.fill(NO_PRIMITIVE); }
-
-    // Whether it was there already; it is from now on.
-    bool put(uint32_t primitive) {
-        uint32_t &entry = entries_[primitive % SIZE];
-        const bool known = entry == primitive;
-        entry = primitive;
-        return known;
-    }
-
-private:
-    static constexpr uint32_t SIZE = 512;
-    std::array<uint32_t, SIZE> entries_;
-};
-
 // Keeps in the beam's packets what its rays have found. The group is the one that the beam
 // was loaded from.
 template <Query query>
 class BeamTriangleTests {
 public:
     BeamTriangleTests(const KdTree &tree, const RayGroup &rays, HitDistances &distances,
-                      uint32_t most_triangles, BeamPackets &beam, Counters &counters)
-        : tree_(tree), rays_(rays), distances_(distances), beam_(beam), counters_(counters),
-          triangles_left_(most_triangles) {
+                      Mailbox &mailbox, uint32_t most_triangles, BeamPackets &beam,
+                      Counters &counters)
+        : tree_(tree), rays_(rays), distances_(distances), mailbox_(mailbox), beam_(beam),
+          counters_(counters), triangles_left_(most_triangles) {
+        mailbox_.clear();
         update_least();
     }
 
@@ -76,6 +60,7 @@ private:
     const KdTree &tree_;
     const RayGroup &rays_;
     HitDistances &distances_;
+    Mailbox &mailbox_;
     BeamPackets &beam_;
     Counters &counters_;
     uint32_t triangles_left_;
@@ -90,7 +75,6 @@ private:
     uint32_t waiting_count_ = 0;
     std::array<uint32_t, WIDE_WIDTH> hit_;
     uint32_t hit_count_ = 0;
-    Mailbox mailbox_;
     float least_ = 0; // of all rays
     float far_end_ = 0;
 };
