@@ -46,10 +46,9 @@ float choose_face(const EmitterTable &table, uint32_t first_face, float y, uint3
 }
 FloatPacket choose_face(const EmitterTable &table, uint32_t first_face,
                         const FloatPacket &y, FaceNumbers &faces) {
-    LaneArray<float> lanes = to_lanes<float>(y);
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-        lanes[lane] = choose_face(table, first_face, lanes[lane], faces[lane]);
-    return load<FloatPacket>(lanes);
+    const Distribution::Choices choices = table.face_areas.choose(y);
+    faces = to_lanes<uint32_t>(choices.index + UIntPacket(first_face));
+    return choices.reused;
 }
 
 // The same face in all lanes.
@@ -280,7 +279,6 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
 }
 
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
-    constexpr size_t FEW = 16; // compared with all; chosen
     const uint32_t count = uint32_t(scene.data.emitters.size());
     if (count == 1)
         return {UIntPacket(0u), FloatPacket(1.0f), x};
@@ -291,21 +289,8 @@ EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x)
             minimum(FloatPacket(UIntPacket(scaled)), FloatPacket(float(count - 1)));
         return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
     }
-    if (scene.emitter_choice.size() <= FEW) {
-        const Distribution::Choices choices = scene.emitter_choice.choose(x);
-        return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
-    }
-    const LaneArray<float> random = to_lanes<float>(x);
-    LaneArray<uint32_t> emitter;
-    LaneArray<float> weight, reused;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const OneChoice choice = choose_emitter(scene, random[lane]);
-        emitter[lane] = choice.emitter;
-        weight[lane] = choice.weight;
-        reused[lane] = choice.reused;
-    }
-    return {load<UIntPacket>(emitter), load<FloatPacket>(weight),
-            load<FloatPacket>(reused)};
+    const Distribution::Choices choices = scene.emitter_choice.choose(x);
+    return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
 }
 
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
