@@ -246,7 +246,7 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
         const ShadowSegment<FloatPacket> segment =
             shadow_segment(scene_, offset_, hit, point, emitter, light);
         const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-        shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
+        shadows_[emitter].append(lit, hit, segment.start, segment.target,
                                  (albedo * share) * light.weight);
     });
 }
@@ -363,17 +363,12 @@ void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
 
 void TileRenderer::add_reflected_light() {
     float *cost = target_.cost ? cost_.data() : nullptr;
-    float *red = values_[0].data(), *green = values_[1].data(), *blue = values_[2].data();
+    const std::array<float *, 3> colours{values_[0].data(), values_[1].data(),
+                                         values_[2].data()};
     for (ShadowRays &shadow : shadows_)
-        shadow.trace(scene_.data, options_, counters_.shadow, cost,
-                     [&](uint32_t ray, Vec3f light) {
-                         red[ray] += light.x;
-                         green[ray] += light.y;
-                         blue[ray] += light.z;
-                     });
+        shadow.trace(scene_.data, options_, counters_.shadow, cost, colours);
     if (bsdf_rays_)
-        bsdf_rays_->trace(options_, counters_.bsdf, cost,
-                          std::array<float *, 3>{red, green, blue});
+        bsdf_rays_->trace(options_, counters_.bsdf, cost, colours);
 }
 
 void TileRenderer::write(const PixelGroup &group) {
