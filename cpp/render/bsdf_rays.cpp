@@ -87,7 +87,7 @@ Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t fir
             load<FloatPacket>(&of[2][first])};
 }
 
-Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const {
+Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) {
     const FloatPacket zero(0.0f);
     Vec3<FloatPacket> light = in_all_lanes({});
     LaneArray<uint32_t> emitters, shape_numbers;
@@ -109,7 +109,7 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
         hit.t = load<FloatPacket>(&t_[first]);
         hit.instances = load<UIntPacket>(&instance_[first]);
     }
-    const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
+    const SurfacePoint<FloatPacket> point = surface_of(scene_, faces_, hit, false);
     const Vec3<FloatPacket> from = vector(p_, first);
     const UIntPacket shapes = load<UIntPacket>(shape_numbers);
     const FloatPacket own =

@@ -47,7 +47,13 @@ void ShadowRays::reserve(size_t size) {
 void ShadowRays::append(LaneBits lanes, const HitPacket &hit, const Vec3<FloatPacket> &from,
                         const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light) {
     reserve(count_ + PACKET_WIDTH);
-    packets_.push_back({light, hit.first, lanes});
+    if (packet_count_ == packets_.size())
+        packets_.resize(std::max<size_t>(PACKET_WIDTH, 2 * packets_.size()));
+    Packet &packet = packets_[packet_count_++];
+    for (int k = 0; k < 3; ++k)
+        packet.light[k] = light[k];
+    packet.first = hit.first;
+    packet.lanes = lanes;
     store_compressed(&ray_[count_], hit.ray, lanes);
     for (int k = 0; k < 3; ++k) {
         if (!from_light_)
@@ -94,7 +100,7 @@ void ShadowRays::trace(const SceneData &scene, const TraceOptions &options,
     find_occluded(scene, options, counters, cost);
     const uint8_t *occluded = occluded_.data();
     const uint32_t *ray = ray_.data();
-    for (const Packet &packet : packets_) {
+    for (const Packet &packet : std::span(packets_).first(packet_count_)) {
         const LaneBits visible = spread_to(packet.lanes, zero_bytes(occluded));
         add_light(packet, visible, ray, colours);
         const int count = std::popcount(packet.lanes);

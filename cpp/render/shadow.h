@@ -25,10 +25,7 @@ class ShadowRays {
 public:
     ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset);
 
-    void clear() {
-        count_ = 0;
-        packets_.clear();
-    }
+    void clear() { count_ = packet_count_ = 0; }
 
     // Adds the lanes whose bit is set: `light` reaches the point `from`, which lies off its
     // surface (see shadow_offset.h), from the point `to`. The hits tell which camera rays
@@ -67,7 +64,8 @@ private:
         std::optional<size_t> first; // camera ray in lane 0, if the others follow it
         LaneBits lanes;
     };
-    std::vector<Packet> packets_;
+    uint32_t packet_count_ = 0;
+    std::vector<Packet> packets_; // and more, to be overwritten
 };
 
 } // namespace mlrt

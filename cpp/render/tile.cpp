@@ -52,6 +52,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
       emitter_samples_(needs_light_numbers(scene) ? sampling.emitter_samples
                                                   : std::min(1u, sampling.emitter_samples)),
       options_(options), offset_(offset), target_(target),
+      faces_(scene, scene.plane.origin),
       samples_(scene, streams, sampling.sampler, target.film.sampled(),
                {target.film.needs_positions(),
                 needs_light_numbers(scene) ? sampling.emitter_samples : 0,
@@ -177,7 +178,8 @@ void TileRenderer::shade_hits() {
             hit.t = load<FloatPacket>(&t_[first]);
             hit.instances = load<UIntPacket>(&instance_[first]);
         }
-        const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, common_origin);
+        const SurfacePoint<FloatPacket> point =
+            surface_of(scene_, faces_, hit, common_origin);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
@@ -232,23 +234,30 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
                                       const SurfacePoint<FloatPacket> &point,
                                       LaneBits lanes, const FloatPacket &cos_view,
                                       const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const FloatPacket zero(0.0f), x = of_rays(hit, samples_.light_x(sample));
+    const FloatPacket x = of_rays(hit, samples_.light_x(sample));
     const FloatPacket y = of_rays(hit, samples_.light_y(sample));
     const EmitterChoices choices = choose_emitters(scene_, x);
-    for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits lit) {
-        const EmitterSample<FloatPacket> light =
-            sample_chosen(scene_, emitter, choices, point.p, y);
-        const FloatPacket cosine = dot(light.direction, point.shading_normal);
-        const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
-        lit &= not_black(light.weight) & to_bits(cos_light > zero);
-        if (lit == 0)
-            return;
-        const ShadowSegment<FloatPacket> segment =
-            shadow_segment(scene_, offset_, hit, point, emitter, light);
-        const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-        shadows_[emitter].append(lit, hit, segment.start, segment.target,
-                                 (albedo * share) * light.weight);
-    });
+    for_each_light(
+        scene_, choices, lanes, point.p, y,
+        [&](uint32_t emitter, LaneBits lit, const EmitterSample<FloatPacket> &light) {
+            add_light(hit, point, lit, cos_view, albedo, emitter, light);
+        });
+}
+
+void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                             LaneBits lanes, const FloatPacket &cos_view,
+                             const Vec3<FloatPacket> &albedo, uint32_t emitter,
+                             const EmitterSample<FloatPacket> &light) {
+    const FloatPacket zero(0.0f), cosine = dot(light.direction, point.shading_normal);
+    const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
+    lanes &= not_black(light.weight) & to_bits(cos_light > zero);
+    if (lanes == 0)
+        return;
+    const ShadowSegment<FloatPacket> segment =
+        shadow_segment(scene_, offset_, hit, point, emitter, light);
+    const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
+    shadows_[emitter].append(lanes, hit, segment.start, segment.target,
+                             (albedo * share) * light.weight);
 }
 
 // Adds what surfaces emit towards the camera. Returns the lanes to be shaded; those that
@@ -358,7 +367,7 @@ void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
     hit.faces = load<UIntPacket>(faces);
     hit.t = load<FloatPacket>(t);
     hit.instances = load<UIntPacket>(instances);
-    shade(hit, surface_of(scene_, hit, false));
+    shade(hit, surface_of(scene_, faces_, hit, false));
 }
 
 void TileRenderer::add_reflected_light() {
