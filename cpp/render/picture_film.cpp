@@ -1,6 +1,7 @@
 #include "render/picture_film.h"
 
 #include "base/morton.h"
+#include "base/pixel_block.h"
 
 #include <utility>
 
@@ -14,8 +15,6 @@ PictureFilm::PictureFilm(const Film &film, uint32_t samples_per_pixel, FilmTarge
         blocks_.emplace(film, channel_count(), samples_per_pixel);
     else if (samples_per_pixel > MOST_PLAIN_SUMMANDS)
         errors_.resize(size_t(channel_count()) * sampled_.width * sampled_.height);
-    for (uint32_t column = 0; column < column_codes_.size(); ++column)
-        column_codes_[column] = morton_code(column, 0);
 }
 
 void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
@@ -34,24 +33,30 @@ void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
     }
 }
 
-// With a box filter the sampled rectangle is the crop. Squares are written row by row:
-// rows may lie so far apart that a cache keeps only a few of them at once.
+// With a box filter the sampled rectangle is the crop. A packet of a square's rays is a
+// block of four by four pixels; blocks are written row by row, because rows may lie so far
+// apart that a cache keeps only a few of them at once.
 void PictureFilm::write_pixels(const PixelGroup &group, const float *const *values) {
+    constexpr uint32_t BLOCK = 4;
     const float *red = values[0], *green = values[1], *blue = values[2];
-    const auto write = [&](float *out, size_t ray) {
-        out[0] = red[ray];
-        out[1] = green[ray];
-        out[2] = blue[ray];
-    };
-    for (uint32_t row = 0; row < group.side; ++row) {
+    const size_t stride = COLOURS * size_t(sampled_.width);
+    const bool in_blocks = group.side >= BLOCK;
+    for (uint32_t row = 0; in_blocks && row < group.side; row += BLOCK) {
         float *out = target_.image + COLOURS * number_of({group.left, group.top + row});
-        const uint32_t of_row = morton_code(0, row);
-        for (uint32_t column = 0; column < group.side; ++column, out += COLOURS)
-            write(out, of_row | column_codes_[column]);
+        for (uint32_t column = 0; column < group.side; column += BLOCK) {
+            const uint32_t ray = morton_code(column, row);
+            store_pixel_block(out, stride, load<FloatPacket>(red + ray),
+                              load<FloatPacket>(green + ray),
+                              load<FloatPacket>(blue + ray));
+            out += COLOURS * BLOCK;
+        }
     }
-    if (group.side == 0)
-        for (size_t i = 0; i < group.offsets.size(); ++i)
-            write(target_.image + COLOURS * number_of(group.pixel(i)), i);
+    for (size_t i = 0; !in_blocks && i < group.offsets.size(); ++i) {
+        float *out = target_.image + COLOURS * number_of(group.pixel(i));
+        out[0] = red[i];
+        out[1] = green[i];
+        out[2] = blue[i];
+    }
     for (uint32_t k = COLOURS; k < channel_count(); ++k)
         for (size_t i = 0; i < group.offsets.size(); ++i)
             channel(k, number_of(group.pixel(i))) = values[k][i];

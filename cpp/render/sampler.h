@@ -142,6 +142,17 @@ inline void draw_numbers(const uint32_t *__restrict seeds,
         }
         return;
     }
+    if (pairs.size() == 2 && !pairs[1].y && pairs[1].x) {
+        float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
+        float *__restrict x1 = pairs[1].x;
+        for (size_t i = 0; i < count; ++i) {
+            Pcg32 random = open(i);
+            x0[i] = random.next_float();
+            y0[i] = random.next_float();
+            x1[i] = random.next_float();
+        }
+        return;
+    }
     if (pairs.size() == 2 && pairs[1].y) {
         float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
         float *__restrict x1 = pairs[1].x, *__restrict y1 = pairs[1].y;
