@@ -45,6 +45,9 @@ public:
 
 private:
     void reserve(size_t size);
+    RayGroup group(float *cost);
+    void add_cost(float *cost) const;
+    void leave_out_dark(const TraceOptions &options, Counters &counters, float *cost);
     void find_hits(const TraceOptions &options, Counters &counters, float *cost);
     Vec3<FloatPacket> light_from_shapes(size_t first, LaneBits hits);
     Vec3<FloatPacket> light_from_around(size_t first, LaneBits misses) const;

@@ -9,6 +9,7 @@
 #include "render/texture_sampler.h"
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace mlrt {
@@ -36,8 +37,9 @@ struct PreparedScene {
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
-    Box3f bounds;   // of all that rays can hit
-    Vec3f center{}; // of a sphere around the bounds
+    std::shared_ptr<const KdTree> glowing_faces; // maybe none, see glowing_faces.h
+    Box3f bounds;                                // of all that rays can hit
+    Vec3f center{};                              // of a sphere around the bounds
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);
