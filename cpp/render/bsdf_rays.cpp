@@ -79,9 +79,13 @@ void BsdfRays::add_cost(float *cost) const {
 // in their way.
 void BsdfRays::leave_out_dark(const TraceOptions &options, Counters &counters,
                               float *cost) {
-    if (!scene_.glowing_faces || scene_.environment.exists())
+    if (!scene_.glowing || scene_.environment.exists())
         return;
-    trace_any(*scene_.glowing_faces, group(cost), options, blocked_.data(), counters);
+    const GlowingFaces &glowing = *scene_.glowing;
+    const RayGroup rays = group(cost);
+    trace_any(*glowing.tree, rays, options, blocked_.data(), counters);
+    if (glowing.objects)
+        trace_any_objects(*glowing.objects, rays, blocked_.data(), counters);
     add_cost(cost);
     std::vector<float> *const arrays[] = {
         &start_[0],  &start_[1],     &start_[2],     &p_[0],         &p_[1],

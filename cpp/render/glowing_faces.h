@@ -4,14 +4,22 @@
 #pragma once
 
 #include "kdtree/tree.h"
+#include "objects/object_set.h"
 #include "render/scene.h"
 
 #include <memory>
+#include <optional>
 
 namespace mlrt {
 
-// A tree of the faces that glow, in no particular order; none if looking into it would not
-// pay, or some are not triangles of the scene's tree.
-std::shared_ptr<const KdTree> tree_of_glowing_faces(const SceneData &scene);
+// The faces that glow, numbered in no particular order.
+struct GlowingFaces {
+    std::shared_ptr<const KdTree> tree;       // maybe empty
+    std::shared_ptr<const ObjectSet> objects; // maybe none
+};
+
+// None if nothing glows, or so much that looking for it would not pay, or if some of it is
+// in instances.
+std::optional<GlowingFaces> glowing_faces(const SceneData &scene);
 
 } // namespace mlrt

@@ -26,11 +26,7 @@ void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
             add_whole_pixels(group, values);
         return;
     }
-    for (size_t i = 0; i < group.offsets.size(); ++i) {
-        const Pixel pixel = group.pixel(i);
-        blocks_->add(pixel.column, pixel.row, i * group.sample_count, group.sample_count, x,
-                     y, values);
-    }
+    blocks_->add(group, x, y, values);
 }
 
 // With a box filter the sampled rectangle is the crop. A packet of a square's rays is a

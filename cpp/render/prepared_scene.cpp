@@ -1,6 +1,5 @@
 #include "render/prepared_scene.h"
 
-#include "render/glowing_faces.h"
 #include "render/shadow_offset.h"
 
 #include <algorithm>
@@ -146,8 +145,7 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
 
 PreparedScene::PreparedScene(SceneData scene_data)
     : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
-      environment(data), glowing_faces(tree_of_glowing_faces(data)),
-      bounds(bounds_of(data)) {
+      environment(data), glowing(glowing_faces(data)), bounds(bounds_of(data)) {
     shape_of_face.resize(data.objects ? data.objects->face_end()
                                       : data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {

@@ -4,12 +4,13 @@
 #include "render/camera.h"
 #include "render/distribution.h"
 #include "render/environment.h"
+#include "render/glowing_faces.h"
 #include "render/point_light.h"
 #include "render/scene.h"
 #include "render/texture_sampler.h"
 
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -37,9 +38,9 @@ struct PreparedScene {
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
-    std::shared_ptr<const KdTree> glowing_faces; // maybe none, see glowing_faces.h
-    Box3f bounds;                                // of all that rays can hit
-    Vec3f center{};                              // of a sphere around the bounds
+    std::optional<GlowingFaces> glowing;
+    Box3f bounds;   // of all that rays can hit
+    Vec3f center{}; // of a sphere around the bounds
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);
