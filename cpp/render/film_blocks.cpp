@@ -109,10 +109,17 @@ void FilmBlocks::add_colours(const PixelGroup &group, size_t first, const float 
     const uint32_t count =
         uint32_t(std::min<size_t>(PACKET_WIDTH, group.ray_count() - first));
     const int reach = filter_.reach();
+    // Lanes behind the last sample repeat it.
     LaneArray<float> center_x, center_y;
+    size_t number = first / group.sample_count;
+    size_t next = (number + 1) * group.sample_count; // first sample of the next pixel
     for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
         const size_t sample = first + std::min(lane, count - 1);
-        const Pixel pixel = group.pixel(sample / group.sample_count);
+        if (sample == next) {
+            ++number;
+            next += group.sample_count;
+        }
+        const Pixel pixel = group.pixel(number);
         center_x[lane] = float(sampled_.x + int(pixel.column) - reach) + 0.5f;
         center_y[lane] = float(sampled_.y + int(pixel.row) - reach) + 0.5f;
         weights.entries[lane][0] = 1;
@@ -125,10 +132,10 @@ void FilmBlocks::add_colours(const PixelGroup &group, size_t first, const float 
         weights.columns[i] = filter_.weight(left + FloatPacket(float(i)));
         weights.rows[i] = filter_.weight(top + FloatPacket(float(i)));
     }
-    for (uint32_t begin = 0; begin < count;) {
-        const size_t pixel = (first + begin) / group.sample_count;
-        const uint32_t end =
-            uint32_t(std::min<size_t>(count, (pixel + 1) * group.sample_count - first));
+    size_t pixel = first / group.sample_count;
+    for (uint32_t begin = 0; begin < count; ++pixel) {
+        const size_t next = (pixel + 1) * group.sample_count;
+        const uint32_t end = uint32_t(std::min<size_t>(count, next - first));
         spread_colours(corner_of(group.pixel(pixel)), weights, begin, end);
         begin = end;
     }
@@ -209,29 +216,52 @@ const float *FilmBlocks::at(uint32_t block, int column, int row) const {
                (channel_count_ + 1);
 }
 
+// Blocks whose pixels lie within reach of one, along one axis.
+struct FilmBlocks::BlockRange {
+    int first, last;
+};
+FilmBlocks::BlockRange FilmBlocks::blocks_near(int position, uint32_t blocks) const {
+    const int reach = filter_.reach(), size = int(BLOCK_SIZE);
+    return {std::max(position - reach, 0) / size,
+            std::min((position + reach) / size, int(blocks) - 1)};
+}
+
+template <typename Visit>
+void FilmBlocks::for_each_entry(int column, int row, BlockRange down, Visit &&visit) const {
+    const int reach = filter_.reach(), size = int(BLOCK_SIZE);
+    const BlockRange across = blocks_near(column, blocks_across_);
+    for (int j = down.first; j <= down.last; ++j)
+        for (int i = across.first; i <= across.last; ++i)
+            visit(at(uint32_t(j) * blocks_across_ + uint32_t(i), column - i * size + reach,
+                     row - j * size + reach));
+}
+
 float FilmBlocks::pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const {
-    const int reach = filter_.reach();
     const int column = int(film_.crop_x + crop_column) - sampled_.x;
     const int row = int(film_.crop_y + crop_row) - sampled_.y;
-    const int size = int(BLOCK_SIZE);
-    // Blocks whose pixels lie within reach of this one.
-    const int first_across = std::max(column - reach, 0) / size;
-    const int last_across = std::min((column + reach) / size, int(blocks_across_) - 1);
-    const int first_down = std::max(row - reach, 0) / size;
-    const int last_down = std::min((row + reach) / size, int(blocks_down_) - 1);
-
     float weight = 0;
     std::fill_n(sums, channel_count_, 0.0f);
-    for (int down = first_down; down <= last_down; ++down) {
-        for (int across = first_across; across <= last_across; ++across) {
-            const float *in = at(uint32_t(down) * blocks_across_ + uint32_t(across),
-                                 column - across * size + reach, row - down * size + reach);
-            weight += in[0];
-            for (uint32_t k = 0; k < channel_count_; ++k)
-                sums[k] += in[1 + k];
-        }
-    }
+    for_each_entry(column, row, blocks_near(row, blocks_down_), [&](const float *in) {
+        weight += in[0];
+        for (uint32_t k = 0; k < channel_count_; ++k)
+            sums[k] += in[1 + k];
+    });
     return weight;
+}
+
+void FilmBlocks::develop_colours(uint32_t crop_row, float *colours) const {
+    const int left = int(film_.crop_x) - sampled_.x;
+    const int row = int(film_.crop_y + crop_row) - sampled_.y;
+    const BlockRange down = blocks_near(row, blocks_down_);
+    for (uint32_t column = 0; column < film_.crop_width; ++column, colours += 3) {
+        PointPacket sums(0.0f);
+        for_each_entry(left + int(column), row, down,
+                       [&](const float *in) { sums = sums + load<PointPacket>(in); });
+        const float weight = sums.entry(0);
+        const PointPacket quotients = sums / PointPacket(weight == 0 ? 1.0f : weight);
+        for (size_t k = 0; k < 3; ++k)
+            colours[k] = quotients.entry(1 + k);
+    }
 }
 
 } // namespace mlrt

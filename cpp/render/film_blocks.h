@@ -41,6 +41,10 @@ public:
     // Sum of weight * value of one pixel of the crop, for each channel, and of the weights.
     float pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const;
 
+    // Of a row of the crop, if the channels are red, green and blue: the sums over those of
+    // the weights, side by side, pixel by pixel.
+    void develop_colours(uint32_t crop_row, float *colours) const;
+
 private:
     int taps() const { return 2 * filter_.reach() + 1; } // along a row or column
     struct Footprint;
@@ -55,6 +59,10 @@ private:
                      const float *const *values, PacketWeights &weights);
     void spread_colours(float *corner, const PacketWeights &weights, uint32_t begin,
                         uint32_t end) const;
+    struct BlockRange;
+    BlockRange blocks_near(int position, uint32_t blocks) const;
+    template <typename Visit>
+    void for_each_entry(int column, int row, BlockRange down, Visit &&visit) const;
     const float *at(uint32_t block, int column, int row) const;
 
     Film film_;

@@ -84,6 +84,11 @@ void PictureFilm::add_whole_pixels(const PixelGroup &group, const float *const *
 
 // Divides the sums by their weights (Mitsuba's hdrfilm.cpp, develop).
 void PictureFilm::finish_row(uint32_t row) {
+    if (channel_count() == COLOURS) {
+        blocks_->develop_colours(row,
+                                 target_.image + COLOURS * size_t(row) * film_.crop_width);
+        return;
+    }
     std::vector<float> sums(channel_count());
     for (uint32_t column = 0; column < film_.crop_width; ++column) {
         const float weight = blocks_->pixel(column, row, sums.data());
