@@ -109,7 +109,7 @@ private:
                              const Scattering &scattering, uint32_t sample);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
-    void pass_hidden_emitters();
+    void pass_hidden_emitters(); // in hidden_emitters.cpp
     // What rays hit, by ray; distances and instances only if they are wanted.
     struct Hits {
         std::vector<float> t;
@@ -117,7 +117,8 @@ private:
     };
     void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
                uint32_t *instance);
-    void shade_passed(const PassingRays &passing, const Hits &hits, size_t first);
+    void shade_passed(const PassingRays &passing, const Hits &hits,
+                      size_t first); // as well
     void add_reflected_light();
     void write(const PixelGroup &group);
 
