@@ -6,20 +6,20 @@ namespace mlrt {
 
 HitFace hit_face(Vec3f origin, const Corners<float> &corners, const Corners<float> *normals,
                  bool flip_normals) {
-    // In double precision, where the product of tiny edges does not vanish.
-    const Vec3d a(corners.a);
+    // In double precision also because the product of tiny edges vanishes else.
+    const Vec3d a(corners.a), way = Vec3d(origin) - a;
     const Vec3d edge_b = Vec3d(corners.b) - a, edge_c = Vec3d(corners.c) - a;
     const Vec3d product = cross(edge_b, edge_c);
-    const double sign = flip_normals ? -1.0 : 1.0;
-    const double scale = sign / length(product);
+    const double scale = 1.0 / length(product);
+    const float turn = flip_normals ? -1.0f : 1.0f;
     HitFace face;
-    face.edge_b = Vec3f(edge_b * scale);
-    face.edge_c = Vec3f(edge_c * scale);
-    const Vec3f way = origin - corners.a;
-    face.parts = {corners, Vec3f(product * scale), cross(way, face.edge_c),
-                  cross(face.edge_b, way)};
+    face.edge_b = edge_b * scale;
+    face.edge_c = edge_c * scale;
+    const Vec3d normal = product * scale;
+    face.parts = {corners,
+                  turn * Vec3f(normal),
+                  {normal, cross(way, face.edge_c), cross(face.edge_b, way)}};
     if (normals) {
-        const float turn(sign);
         face.vertex_normals = true;
         face.normals = {turn * normals->a, turn * normals->b, turn * normals->c};
     }

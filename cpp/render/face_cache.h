@@ -15,17 +15,24 @@ namespace mlrt {
 // b and c are
 //     d.((o - a) x e_c) / d.n   and   d.(e_b x (o - a)) / d.n
 // (Moeller and Trumbore 1997, "Fast, minimum storage ray-triangle intersection", with the
-// triple products turned).
+// triple products turned). In double precision, so that rounded weights are those of the
+// queries: from points that differ in their last digits shadow rays end in another pixel.
+template <typename Real>
+struct WeightForm {
+    using Double = DoubleOf<Real>;
+    Vec3<Double> normal, b, c; // what d is multiplied by above
+};
+
 template <typename Real>
 struct FaceParts {
     Corners<Real> corners;
-    Vec3<Real> normal;             // turned if the shape asks for it, and with it the rest
-    Vec3<Real> weight_b, weight_c; // what d and n are multiplied by above
+    Vec3<Real> normal; // unit, turned if the shape asks for it
+    WeightForm<Real> weights;
 };
 
 struct HitFace {
     FaceParts<float> parts; // of rays from the origin that is given
-    Vec3f edge_b, edge_c;   // as above
+    Vec3d edge_b, edge_c;   // as above
     bool vertex_normals = false;
     Corners<float> normals{}; // of the vertices, if it has them, turned too; else zeros
 };
@@ -49,7 +56,7 @@ public:
     }
 
 private:
-    static constexpr uint32_t SIZE = 64; // chosen: 10 KiB
+    static constexpr uint32_t SIZE = 64; // chosen: 16 KiB
 
     struct Entry {
         uint32_t number = NONE;

@@ -45,11 +45,13 @@ Real fused_dot(const Vec3<Real> &a, const Vec3<Part> &b) {
 // As a ray has them that is known to hit; where they are no numbers, some point of the
 // face.
 template <typename Real, typename Part>
-Vec2<Real> weights_of(const Vec3<Real> &direction, const FaceParts<Part> &face) {
+Vec2<Real> weights_of(const Vec3<Real> &direction, const WeightForm<Part> &form) {
+    using Double = DoubleOf<Real>;
+    const auto d = to_double(direction);
+    const Double scale = Double(1.0) / fused_dot(d, form.normal);
     const Real zero(0.0f), one(1.0f);
-    const Real scale = one / fused_dot(direction, face.normal);
-    const Real b = maximum(fused_dot(direction, face.weight_b) * scale, zero);
-    const Real c = maximum(fused_dot(direction, face.weight_c) * scale, zero);
+    const Real b = maximum(Real(fused_dot(d, form.b) * scale), zero);
+    const Real c = maximum(Real(fused_dot(d, form.c) * scale), zero);
     const Real weight_b = minimum(b, one);
     return {weight_b, minimum(c, one - weight_b)};
 }
@@ -71,7 +73,7 @@ Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Part> &n,
 template <typename Real, typename Part>
 SurfacePoint<Real> point_on(const Vec3<Real> &direction, const FaceParts<Part> &face,
                             const Corners<Part> *normals) {
-    const Vec2<Real> at = weights_of(direction, face);
+    const Vec2<Real> at = weights_of(direction, face.weights);
     const Vec3<Real> normal(face.normal);
     return {interpolate(face.corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
             normals ? interpolated_normal(at, *normals, face.normal) : normal};
@@ -83,12 +85,17 @@ SurfacePoint<Real> point_on(const Vec3<Real> &direction, const HitFace &face) {
 }
 
 // Sets the given lanes.
-void place(Vec3<FloatPacket> &vectors, const MaskOf<FloatPacket> &lanes, Vec3f vector) {
+void place(Vec3<FloatPacket> &vectors, LaneBits lanes, Vec3f vector) {
+    const auto mask = from_bits<FloatPacket>(lanes);
     for (int k = 0; k < 3; ++k)
-        vectors[k] = select(lanes, FloatPacket(vector[k]), vectors[k]);
+        vectors[k] = select(mask, FloatPacket(vector[k]), vectors[k]);
 }
-void place(Corners<FloatPacket> &corners, const MaskOf<FloatPacket> &lanes,
-           const Corners<float> &values) {
+void place(Vec3<DoublePacket> &vectors, LaneBits lanes, Vec3d vector) {
+    const auto mask = from_bits<DoublePacket>(lanes);
+    for (int k = 0; k < 3; ++k)
+        vectors[k] = select(mask, DoublePacket(vector[k]), vectors[k]);
+}
+void place(Corners<FloatPacket> &corners, LaneBits lanes, const Corners<float> &values) {
     place(corners.a, lanes, values.a);
     place(corners.b, lanes, values.b);
     place(corners.c, lanes, values.c);
@@ -106,21 +113,24 @@ struct FaceLanes {
 
     // All lanes take the first face.
     explicit FaceLanes(const HitFace &face)
-        : parts{corners_in_all_lanes(face.parts.corners), in_all_lanes(face.parts.normal),
-                in_all_lanes(face.parts.weight_b), in_all_lanes(face.parts.weight_c)},
+        : parts{corners_in_all_lanes(face.parts.corners),
+                in_all_lanes(face.parts.normal),
+                {Vec3<DoublePacket>(face.parts.weights.normal),
+                 Vec3<DoublePacket>(face.parts.weights.b),
+                 Vec3<DoublePacket>(face.parts.weights.c)}},
           normals(corners_in_all_lanes(face.normals)), vertex_normals(face.vertex_normals) {
     }
 
     void set(LaneBits lanes, const HitFace &face) {
-        const auto mask = from_bits<FloatPacket>(lanes);
-        place(parts.corners, mask, face.parts.corners);
-        place(parts.normal, mask, face.parts.normal);
-        place(parts.weight_b, mask, face.parts.weight_b);
-        place(parts.weight_c, mask, face.parts.weight_c);
+        place(parts.corners, lanes, face.parts.corners);
+        place(parts.normal, lanes, face.parts.normal);
+        place(parts.weights.normal, lanes, face.parts.weights.normal);
+        place(parts.weights.b, lanes, face.parts.weights.b);
+        place(parts.weights.c, lanes, face.parts.weights.c);
         if (!vertex_normals && !face.vertex_normals)
             return;
         vertex_normals = true;
-        place(normals, mask, face.normals);
+        place(normals, lanes, face.normals);
     }
 };
 
@@ -173,23 +183,23 @@ SurfacePoint<FloatPacket> hit_surfaces(FaceCache &cache, const Vec3<FloatPacket>
     if (others == 0 && !origin)
         return point_on(direction, cache.of(first));
     FaceLanes met(cache.of(first));
-    Vec3<FloatPacket> edge_b, edge_c;
+    Vec3<DoublePacket> edge_b, edge_c;
     if (origin) {
-        edge_b = in_all_lanes(cache.of(first).edge_b);
-        edge_c = in_all_lanes(cache.of(first).edge_c);
+        edge_b = Vec3<DoublePacket>(cache.of(first).edge_b);
+        edge_c = Vec3<DoublePacket>(cache.of(first).edge_c);
     }
     for_each_value(faces, others, [&](uint32_t number, LaneBits holders) {
         const HitFace &face = cache.of(number);
         met.set(holders, face);
         if (origin) {
-            place(edge_b, from_bits<FloatPacket>(holders), face.edge_b);
-            place(edge_c, from_bits<FloatPacket>(holders), face.edge_c);
+            place(edge_b, holders, face.edge_b);
+            place(edge_c, holders, face.edge_c);
         }
     });
     if (origin) {
-        const Vec3<FloatPacket> way = *origin - met.parts.corners.a;
-        met.parts.weight_b = cross(way, edge_c);
-        met.parts.weight_c = cross(edge_b, way);
+        const Vec3<DoublePacket> way = to_double(*origin) - to_double(met.parts.corners.a);
+        met.parts.weights.b = cross(way, edge_c);
+        met.parts.weights.c = cross(edge_b, way);
     }
     return point_on(direction, met.parts, met.vertex_normals ? &met.normals : nullptr);
 }
