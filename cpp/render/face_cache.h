@@ -56,7 +56,7 @@ public:
     }
 
 private:
-    static constexpr uint32_t SIZE = 64; // chosen: 16 KiB
+    static constexpr uint32_t SIZE = 64; // chosen: 14 KiB
 
     struct Entry {
         uint32_t number = NONE;
