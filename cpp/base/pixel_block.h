@@ -9,6 +9,9 @@
 
 namespace mlrt {
 
+// Pixels along a side.
+inline constexpr uint32_t PIXEL_BLOCK = 4;
+
 // Writes red, green and blue of each pixel side by side, row j of the block to
 // out + j * stride. Nothing but these rows is written to.
 inline void store_pixel_block(float *out, size_t stride, const FloatPacket &red,

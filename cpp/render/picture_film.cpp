@@ -2,7 +2,10 @@
 
 #include "base/morton.h"
 #include "base/pixel_block.h"
+#include "base/streamed.h"
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 namespace mlrt {
@@ -29,29 +32,40 @@ void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
     blocks_->add(group, x, y, values);
 }
 
-// With a box filter the sampled rectangle is the crop. A packet of a square's rays is a
-// block of four by four pixels; blocks are written row by row, because rows may lie so far
-// apart that a cache keeps only a few of them at once.
-void PictureFilm::write_pixels(const PixelGroup &group, const float *const *values) {
-    constexpr uint32_t BLOCK = 4;
-    const float *red = values[0], *green = values[1], *blue = values[2];
-    const size_t stride = COLOURS * size_t(sampled_.width);
-    const bool in_blocks = group.side >= BLOCK;
-    for (uint32_t row = 0; in_blocks && row < group.side; row += BLOCK) {
-        float *out = target_.image + COLOURS * number_of({group.left, group.top + row});
-        for (uint32_t column = 0; column < group.side; column += BLOCK) {
-            const uint32_t ray = morton_code(column, row);
-            store_pixel_block(out, stride, load<FloatPacket>(red + ray),
-                              load<FloatPacket>(green + ray),
-                              load<FloatPacket>(blue + ray));
-            out += COLOURS * BLOCK;
+// A packet of a square's rays is a block of four by four pixels. Rows of blocks are put
+// together before they are written: rows of a picture may lie so far apart that a cache
+// keeps only a few of them at once.
+void PictureFilm::write_square(const PixelGroup &group, const float *const *values) {
+    constexpr uint32_t STRIP = 64; // pixels along a row that are put together; chosen
+    std::array<std::array<float, COLOURS * STRIP>, PIXEL_BLOCK> rows;
+    const uint32_t width = std::min(STRIP, group.side);
+    for (uint32_t top = 0; top < group.side; top += PIXEL_BLOCK)
+        for (uint32_t left = 0; left < group.side; left += width) {
+            for (uint32_t column = 0; column < width; column += PIXEL_BLOCK) {
+                const uint32_t ray = morton_code(left + column, top);
+                store_pixel_block(rows[0].data() + COLOURS * column, rows[0].size(),
+                                  load<FloatPacket>(values[0] + ray),
+                                  load<FloatPacket>(values[1] + ray),
+                                  load<FloatPacket>(values[2] + ray));
+            }
+            for (uint32_t row = 0; row < PIXEL_BLOCK; ++row) {
+                const Pixel first{group.left + left, group.top + top + row};
+                stream(target_.image + COLOURS * number_of(first), rows[row].data(),
+                       COLOURS * width);
+            }
         }
-    }
+    finish_streaming();
+}
+
+// With a box filter the sampled rectangle is the crop.
+void PictureFilm::write_pixels(const PixelGroup &group, const float *const *values) {
+    const bool in_blocks = group.side >= PIXEL_BLOCK;
+    if (in_blocks)
+        write_square(group, values);
     for (size_t i = 0; !in_blocks && i < group.offsets.size(); ++i) {
         float *out = target_.image + COLOURS * number_of(group.pixel(i));
-        out[0] = red[i];
-        out[1] = green[i];
-        out[2] = blue[i];
+        for (uint32_t k = 0; k < COLOURS; ++k)
+            out[k] = values[k][i];
     }
     for (uint32_t k = COLOURS; k < channel_count(); ++k)
         for (size_t i = 0; i < group.offsets.size(); ++i)

@@ -68,6 +68,7 @@ private:
         return other.data[other.stride * pixel];
     }
     void write_pixels(const PixelGroup &group, const float *const *values);
+    void write_square(const PixelGroup &group, const float *const *values);
     void add_whole_pixels(const PixelGroup &group, const float *const *values);
 
     Film film_;
