@@ -76,9 +76,10 @@ private:
         }
         for (uint32_t n = 0; n < beam.count; ++n)
             finish(beam.packets[n], done, frontier);
+        packets_.flush();
     }
 
-    // Writes what a packet has found, or traces the rest of it by X2.
+    // Writes what a packet has found, or leaves the rest of it to others.
     void finish(const BeamPacket &packet, bool done, const Frontier &frontier) {
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
@@ -92,7 +93,7 @@ private:
                 output_.set(packet.first_ray, packet.found, packet.primitive);
         }
         if (left != 0)
-            packets_.trace_lanes(packet.first_ray, left, frontier);
+            packets_.trace_stray(packet.first_ray, left, frontier);
     }
 
     FloatPacket distances_of(const BeamPacket &packet) {
