@@ -79,7 +79,7 @@ void BsdfRays::add_cost(float *cost) const {
 // in their way.
 void BsdfRays::leave_out_dark(const TraceOptions &options, Counters &counters,
                               float *cost) {
-    if (!scene_.glowing || scene_.environment.exists())
+    if (!looks_for_light_first(scene_))
         return;
     const GlowingFaces &glowing = *scene_.glowing;
     const RayGroup rays = group(cost);

@@ -24,6 +24,11 @@ struct SampleShares {
     SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples);
 };
 
+// Whether rays are only traced if they meet something that glows.
+inline bool looks_for_light_first(const PreparedScene &scene) {
+    return scene.glowing && !scene.environment.exists();
+}
+
 // Rays in no order. What they bring back is weighed by the power heuristic against emitter
 // samples.
 class BsdfRays {
