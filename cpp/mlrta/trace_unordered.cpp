@@ -13,8 +13,6 @@ namespace {
 
 bool may_be_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptions &options) {
     // In the wide tree rays share nothing.
-    if (!rays.has_common_origin && wide_tree_for(tree, options))
-        return false;
     return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
