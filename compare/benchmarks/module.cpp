@@ -184,6 +184,14 @@ void bind_mlrt(nb::module_ &m) {
             nb::arg("mesh"), nb::arg("options"))
         .def_prop_ro("seconds", [](const TimedTree &self) { return self.seconds; })
         .def_prop_ro("bytes", &TimedTree::bytes)
+        .def(
+            "widen",
+            [](const TimedTree &self) {
+                const nb::gil_scoped_release release;
+                const KdTree &tree = self.built.tree;
+                tree.widening->make(tree);
+            },
+            "Makes the form of the tree for rays that go alone.")
         .def_prop_ro("state",
                      [](const TimedTree &self) {
                          const GrowthState state = self.state();
