@@ -94,7 +94,7 @@ def markdown(figures: dict[str, Any]) -> str:
         f"{bias['uniform_p']:.2g}, means with p {bias['mean_p']:.2g}; MLRT's mean is "
         f"{100 * low:+.4f} % to {100 * high:+.4f} % from Mitsuba's (99 %). The noise of "
         f"the tiles has the same variance with p {bias['spread_smallest_p']:.2g}; over "
-        f"all, MLRT's is {bias['variance_ratio']:.3f} times Mitsuba's.",
+        f"all, MLRT's is {bias['variance_ratio']:.3f} times Mitsuba's. {quiet_tiles(bias)}",
     ]
     even = figures["break_even_frames"]
     lines += [
@@ -104,6 +104,19 @@ def markdown(figures: dict[str, Any]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def quiet_tiles(bias: dict[str, Any]) -> str:
+    """What became of the tiles that Welch's test leaves out."""
+    count, differing = bias["quiet_tiles"], bias["differing_quiet"]
+    if not count:
+        return "All tiles have more noise than rounding."
+    differ = {0: "none of them differs", 1: "1 of them differs"}
+    return (
+        f"{count} tiles have less noise than rounding; "
+        f"{differ.get(differing, f'{differing} of them differ')} by more than both explain "
+        f"(smallest p {bias['quiet_smallest_p']:.2g} for all together)."
+    )
 
 
 def estimate(value: dict[str, Any], digits: int = 2) -> str:
