@@ -82,7 +82,7 @@ def import_scene(
     lighting: what to render in place of what the scene's integrator asks for.
     force_direct: whether to render direct illumination where the integrator asks for more.
     summary: what `summarise` gave for the same scene, sensor and defines, so that it is not
-    parsed again; each can be used once.
+    parsed again; each can be used once, and RuntimeError is raised after that.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
