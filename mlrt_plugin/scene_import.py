@@ -246,8 +246,8 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
         if element.properties.get("to_world") is not None
     ]
     if moved:
-        matrices = [objects.matrix(e.properties["to_world"]) for e in moved]
-        objects.check_all_invertible(np.stack(matrices), moved)
+        matrices = (e.properties["to_world"].matrix for e in moved)
+        objects.check_all_invertible(objects.scalar_matrices(matrices, len(moved)), moved)
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
@@ -257,7 +257,7 @@ def check_files(parsed: parsing.ParsedScene) -> None:
     with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
             for name in ("bitmap", "data"):
-                if 0 in np.shape(element.properties.get(name, 1)):
+                if name in element.properties and 0 in np.shape(element.properties[name]):
                     raise SceneError(f"{element} has a {name} of no pixels: give it some")
             filename = element.properties.get("filename")
             if filename is None:
