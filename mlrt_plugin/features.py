@@ -170,6 +170,7 @@ def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:
             e.id,
             e.where,
             "" if e.kind == "integrator" else reason_against(e),
+            e.kind == "bsdf" and any(part.plugin in VARYING for part in e.walk()),
         )
         for e in found
     )

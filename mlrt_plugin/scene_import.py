@@ -310,7 +310,8 @@ def collect(
     shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
-    materials = MaterialTable()
+    framed = integrators.takes_bsdf_samples(found, lighting)
+    materials = MaterialTable(mirrors=framed)
     firsts = zip(geometry.first_faces, geometry.first_vertices, strict=True)
     surfaces = [
         Surface(shape, name, *first)
@@ -319,7 +320,6 @@ def collect(
     rows = [materials.add(surface, names) for surface in surfaces]
     lights = [materials.add_light(surface, names) for surface in surfaces]
     textured = materials.uses_coordinates()
-    framed = integrators.takes_bsdf_samples(found, lighting)
     coordinates = gather_coordinates(
         shapes,
         shape_names,
@@ -391,6 +391,8 @@ def collect(
         textures=tuple(materials.textures.textures),
         material_textures=materials.texture_array(),
         material_passes=materials.passes(),
+        speculars=materials.speculars(),
+        material_speculars=materials.specular_numbers(),
         uvs=coordinates.uvs,
         sampler=sampler,
         environment=emitters.environment_of(sources, name_of),
