@@ -24,7 +24,7 @@ BRUTE_FORCE: Options = {"traversal": "brute_force", "entry_points": False}
 
 TRAVERSALS: dict[str, Options] = {
     name: {"traversal": name, "entry_points": False}
-    for name in ("single", "packet", "interval", "beam_leaf", "adaptive")
+    for name in ("single", "wide", "packet", "interval", "beam_leaf", "adaptive")
 }
 """Traversals from the root."""
 
@@ -48,6 +48,7 @@ ENTRY_POINTS: dict[str, Options] = {
     "frontier of 16": _entry_points(frontier=16),
     "no covering triangles": _entry_points(covering_triangles=False),
     "single": _entry_points(traversal="single"),
+    "wide": _entry_points(traversal="wide"),
     "interval": _entry_points(traversal="interval"),
     "adaptive": _entry_points(traversal="adaptive"),
     "beam_leaf": _entry_points(traversal="beam_leaf"),

@@ -31,6 +31,7 @@ using UIntPacket = drjit::Packet<uint32_t, PACKET_WIDTH>;
 inline constexpr uint32_t BLOCK_WIDTH = 8;
 using FloatBlock = drjit::Packet<float, BLOCK_WIDTH>;
 using DoubleBlock = drjit::Packet<double, BLOCK_WIDTH>;
+using UIntBlock = drjit::Packet<uint32_t, BLOCK_WIDTH>;
 
 // As many triangles as one register holds: where there are many of them.
 #if defined(__AVX512F__)
@@ -175,6 +176,28 @@ inline float least_lane(const FloatPacket &a) {
 }
 inline float greatest_lane(const FloatPacket &a) {
     return drjit::max(a);
+}
+
+// In the lowest bits of each lane four bits of a word, the lowest ones in lane 0; what lies
+// above them is undefined.
+inline UIntBlock four_bits_each(uint32_t word) {
+    return UIntBlock(word) >> (drjit::arange<UIntBlock>() * 4u);
+}
+
+// block[order[lane]] in each lane; only the lowest three bits of an order count.
+template <typename Block>
+Block permuted(const Block &block, const UIntBlock &order) {
+#if defined(__AVX2__)
+    if constexpr (std::is_same_v<Block, FloatBlock>)
+        return Block(_mm256_permutevar8x32_ps(block.m, order.m));
+    else
+        return Block(_mm256_permutevar8x32_epi32(block.m, order.m));
+#else
+    Block result;
+    for (uint32_t lane = 0; lane < BLOCK_WIDTH; ++lane)
+        result.entry(lane) = block.entry(order.entry(lane) & (BLOCK_WIDTH - 1));
+    return result;
+#endif
 }
 
 inline float sum_of_lanes(const FloatPacket &a) {
@@ -329,7 +352,7 @@ LaneArray<Value> to_lanes(const Packet &packet) {
 // there must be room for a whole packet.
 template <typename Packet, typename Value>
 void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
-    if (bits == ALL_LANES) {
+    if (drjit::size_v<Packet> == PACKET_WIDTH && bits == ALL_LANES) {
         store(values, packet);
         return;
     }
@@ -340,9 +363,16 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
     } else if constexpr (std::is_same_v<Packet, UIntPacket>) {
         store(values, Packet(_mm512_maskz_compress_epi32(__mmask16(bits), packet.m)));
         return;
+    } else if constexpr (std::is_same_v<Packet, FloatBlock>) {
+        store(values, Packet(_mm256_maskz_compress_ps(__mmask8(bits), packet.m)));
+        return;
+    } else if constexpr (std::is_same_v<Packet, UIntBlock>) {
+        store(values, Packet(_mm256_maskz_compress_epi32(__mmask8(bits), packet.m)));
+        return;
     }
 #endif
-    const LaneArray<Value> lanes = to_lanes<Value>(packet);
+    std::array<Value, drjit::size_v<Packet>> lanes;
+    store(lanes.data(), packet);
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
 }
 

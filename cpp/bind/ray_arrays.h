@@ -43,6 +43,13 @@ public:
 
     size_t count() const { return count_; }
 
+    bool have_common_origin() const {
+        for (size_t i = 1; i < count_; ++i)
+            if (!(origin(i) == origin(0)))
+                return false;
+        return true;
+    }
+
     Vec3f origin(size_t i) const {
         return {origins_[0][i], origins_[1][i], origins_[2][i]};
     }

@@ -19,6 +19,7 @@ inline TraceOptions trace_options_from(nanobind::handle dict) {
                                                   {"packet", Traversal::packet},
                                                   {"interval", Traversal::interval},
                                                   {"beam_leaf", Traversal::beam_leaf},
+                                                  {"wide", Traversal::wide},
                                                   {"adaptive", Traversal::adaptive}},
                                                  options.traversal);
     options.entry_points = fields.boolean("entry_points", options.entry_points);

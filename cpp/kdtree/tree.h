@@ -5,6 +5,7 @@
 #include "base/vec.h"
 #include "geometry/triangle.h"
 #include "kdtree/node.h"
+#include "kdtree/widening.h"
 
 #include <cstdint>
 #include <memory>
@@ -32,6 +33,9 @@ struct KdTree {
     // What is not built yet; none if all is. Nodes and references that are added lie in
     // the arrays' capacity.
     std::shared_ptr<LazyGrowth> growth;
+
+    // Its form for rays that go alone.
+    std::shared_ptr<Widening> widening = std::make_shared<Widening>();
 
     // The node, after building it if that has not been done. From any thread.
     KdNode node(uint32_t index) const {

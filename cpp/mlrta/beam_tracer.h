@@ -80,9 +80,10 @@ private:
             finish(beam.packets[n], done, frontier);
         if (beam.any_stray)
             trace_strays(frontier);
+        packets_.flush();
     }
 
-    // Writes what a packet has found, or traces the rest of it by X2.
+    // Writes what a packet has found, or leaves the rest of it to others.
     void finish(const BeamPacket &packet, bool done, const Frontier &frontier) {
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
@@ -96,7 +97,7 @@ private:
                 output_.set(packet.first_ray, packet.found, packet.primitive);
         }
         if (left != 0)
-            packets_.trace_lanes(packet.first_ray, left, frontier);
+            packets_.trace_stray(packet.first_ray, left, frontier);
     }
 
     FloatPacket distances_of(const BeamPacket &packet) {

@@ -6,6 +6,7 @@
 #include "mlrta/tactics.h"
 #include "mlrta/trace.h"
 #include "mlrta/trace_output.h"
+#include "mlrta/wide_tracer.h"
 #include "traverse/brute_force.h"
 #include "traverse/interval.h"
 #include "traverse/load_packet.h"
@@ -15,6 +16,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <optional>
 #include <span>
 
 namespace mlrt {
@@ -32,11 +34,15 @@ public:
     PacketTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
                  Output output, Counters &counters)
         : tree_(tree), rays_(rays), options_(options), output_(output),
-          counters_(counters) {}
+          counters_(counters) {
+        if (const WideTree *wide = wide_tree_for(tree, options))
+            alone_.emplace(tree, *wide, rays, output, counters);
+    }
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
-        if (options_.traversal == Traversal::single)
+        if (options_.traversal == Traversal::single ||
+            options_.traversal == Traversal::wide)
             trace_singles(first, count, frontier);
         else if (options_.traversal == Traversal::adaptive)
             trace_either_way(first, count, frontier);
@@ -65,6 +71,21 @@ public:
         });
     }
 
+    // The same for lanes that a beam is no good for, through the wide tree if it is there:
+    // then flush() waits for their answers.
+    void trace_stray(uint32_t first, LaneBits lanes, const Frontier &frontier) {
+        if (alone_) {
+            alone_->add(first, lanes);
+            return;
+        }
+        tree_.widening->miss(uint64_t(std::popcount(lanes)));
+        trace_lanes(first, lanes, frontier);
+    }
+    void flush() {
+        if (alone_)
+            alone_->flush();
+    }
+
 private:
     void trace_packets(uint32_t first, uint32_t count, const Frontier &frontier) {
         for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
@@ -72,6 +93,8 @@ private:
     }
 
     void trace_either_way(uint32_t first, uint32_t count, const Frontier &frontier) {
+        if (!alone_)
+            tree_.widening->miss(count);
         for (uint32_t done = 0; done < count; done += PacketsOrSingles::RAYS) {
             const uint32_t rays = std::min(count - done, PacketsOrSingles::RAYS);
             const bool singles = tactics_.choose_singles();
@@ -80,7 +103,8 @@ private:
                 trace_singles(first + done, rays, frontier);
             else
                 trace_packets(first + done, rays, frontier);
-            tactics_.learn(singles, before, counters_);
+            tactics_.learn(singles ? (alone_ ? Way::wide : Way::single) : Way::packet,
+                           before, counters_);
         }
     }
 
@@ -128,6 +152,7 @@ private:
         case Traversal::packet:
         case Traversal::single:
         case Traversal::beam_leaf:
+        case Traversal::wide:
         case Traversal::adaptive:
             mlrt::trace_packet(tree_, packet, entry, state, counters_);
             break;
@@ -176,8 +201,12 @@ private:
         output_.set(i, hit);
     }
 
-    // Traces a run of rays by X1.
+    // Traces a run of rays through the wide tree, or by X1.
     void trace_singles(uint32_t first, uint32_t count, const Frontier &frontier) {
+        if (alone_) {
+            alone_->trace(first, count);
+            return;
+        }
         constexpr uint32_t MOST = 64;
         std::array<Ray, MOST> rays;
         std::array<uint32_t, MOST> numbers;
@@ -237,6 +266,7 @@ private:
     Output output_;
     Counters &counters_;
     PacketsOrSingles tactics_;
+    std::optional<WideTracer<Origin, Output>> alone_;
     uint32_t occluder_ = NO_PRIMITIVE; // that stopped rays, of Query::any
 };
 

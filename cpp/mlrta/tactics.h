@@ -7,6 +7,10 @@
 
 namespace mlrt {
 
+// How rays are traced, where it is chosen: sixteen at a time, one at a time, or one at a
+// time through the wide tree.
+enum class Way { packet, single, wide };
+
 // Judges by what both took of the rays before. Neighbours should be much alike: a share of
 // the rays goes the slower way, so that a change is noticed.
 class PacketsOrSingles {
@@ -23,32 +27,45 @@ public:
     }
 
     // What some rays took the way that was chosen, by the counters before and after.
-    void learn(bool singles, const Counters &before, const Counters &after) {
+    void learn(Way way, const Counters &before, const Counters &after) {
         const uint64_t rays = after.rays - before.rays;
         if (rays == 0)
             return;
-        Way &way = singles ? singles_ : packets_;
+        const auto [of_ray, of_step, of_test] = costs(way);
         const float steps = float(after.traversal_steps - before.traversal_steps);
         const float tests = float(after.triangle_tests - before.triangle_tests);
-        const float cost =
-            singles ? SINGLE_RAY + (SINGLE_STEP * steps + SINGLE_TEST * tests) / float(rays)
-                    : (PACKET_STEP * steps + PACKET_TEST * tests) / float(rays);
-        way.cost += (way.rays == 0 ? 1.0f : 0.5f) * (cost - way.cost);
-        way.rays += rays;
+        const float cost = of_ray + (of_step * steps + of_test * tests) / float(rays);
+        Experience &own = way == Way::packet ? packets_ : singles_;
+        own.cost += (own.rays == 0 ? 1.0f : 0.5f) * (cost - own.cost);
+        own.rays += rays;
     }
 
 private:
-    // In nanoseconds, fitted to rays to area lights and skies in conference and sponza
-    // (AVX-512).
-    static constexpr float PACKET_STEP = 20, PACKET_TEST = 25;
-    static constexpr float SINGLE_RAY = 50, SINGLE_STEP = 10, SINGLE_TEST = 8;
+    // In nanoseconds.
+    struct Costs {
+        float ray, step, test;
+    };
+
+    // Fitted to rays to area lights and skies in conference and sponza (AVX-512).
+    static constexpr Costs costs(Way way) {
+        switch (way) {
+        case Way::packet:
+            return {0, 20, 25};
+        case Way::single:
+            return {50, 10, 8};
+        case Way::wide:
+            break;
+        }
+        return {40, 8, 3};
+    }
+
     static constexpr uint32_t CHECK_EVERY = 32;
 
-    struct Way {
+    struct Experience {
         uint64_t rays = 0;
         float cost = 0; // of a ray; a moving average
     };
-    Way packets_, singles_;
+    Experience packets_, singles_;
     uint32_t choices_ = 0;
 };
 

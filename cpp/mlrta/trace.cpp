@@ -29,7 +29,8 @@ public:
 
     void trace() {
         const Frontier root(root_entry(tree_));
-        if (options_.traversal == Traversal::brute_force || !options_.entry_points) {
+        if (options_.traversal == Traversal::brute_force ||
+            options_.traversal == Traversal::wide || !options_.entry_points) {
             runs_.trace(0, rays_.count, root);
             return;
         }

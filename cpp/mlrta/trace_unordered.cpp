@@ -1,6 +1,7 @@
 #include "mlrta/trace_unordered.h"
 
 #include "mlrta/ray_order.h"
+#include "mlrta/wide_tracer.h"
 
 #include <algorithm>
 #include <optional>
@@ -10,7 +11,10 @@ namespace mlrt {
 
 namespace {
 
-bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
+bool may_be_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptions &options) {
+    // In the wide tree rays share nothing.
+    if (!rays.has_common_origin && wide_tree_for(tree, options))
+        return false;
     return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
@@ -67,7 +71,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options))
+    if (may_be_sorted(tree, rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -88,7 +92,7 @@ void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options))
+    if (may_be_sorted(tree, rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_any(tree, rays, options, occluded, counters);

@@ -35,6 +35,17 @@ FilmTarget film_target(RenderResult &result) {
     return target;
 }
 
+// Rays without a common origin, if every sample hits something.
+double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
+                  double samples) {
+    const auto is_lamp = [](const Emitter &emitter) {
+        return emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+    };
+    const bool all_lamps = std::ranges::all_of(scene.data.emitters, is_lamp);
+    return samples * ((all_lamps ? 0 : settings.sampling.emitter_samples) +
+                      settings.sampling.bsdf_samples);
+}
+
 } // namespace
 
 bool render(const PreparedScene &scene, const RenderSettings &settings,
@@ -53,6 +64,11 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
 
     const double all_samples =
         double(sampled.width) * sampled.height * settings.samples_per_pixel;
+    if (settings.trace.traversal == Traversal::wide)
+        scene.data.tree->widening->make(*scene.data.tree);
+    else if (settings.trace.traversal == Traversal::adaptive)
+        scene.data.tree->widening->make_for(
+            *scene.data.tree, uint64_t(rays_alone(scene, settings, all_samples)));
     std::atomic<uint64_t> samples_done{0};
     std::atomic<bool> stop{false};
     const auto ask = [&] {

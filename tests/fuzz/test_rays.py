@@ -71,7 +71,17 @@ OPTIONS = st.fixed_dictionaries(
     {},
     optional={
         "traversal": st.sampled_from(
-            ["brute_force", "single", "packet", "interval", "beam_leaf", "adaptive", "x", 3]
+            [
+                "brute_force",
+                "single",
+                "wide",
+                "packet",
+                "interval",
+                "beam_leaf",
+                "adaptive",
+                "x",
+                3,
+            ]
         ),
         "entry_points": st.sampled_from([True, False, None, "yes", 1]),
         "initial_tile": st.sampled_from([1, 3, 16, 64, 1024, 0, -1, 2**40, "8", 1.5]),

@@ -36,6 +36,7 @@ WAYS: dict[str, Options] = {
             "split in 16",
             "frustum planes",
             "single",
+            "wide",
             "interval",
             "adaptive",
             "beam_leaf",

@@ -295,6 +295,7 @@ def test_every_way_is_drawn() -> None:
     assert traversals == {
         "brute_force",
         "single",
+        "wide",
         "packet",
         "interval",
         "beam_leaf",

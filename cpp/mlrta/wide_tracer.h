@@ -1,0 +1,116 @@
+// Takes rays of a group through the wide tree, one at a time.
+#pragma once
+
+#include "mlrta/ray_cost.h"
+#include "mlrta/trace.h"
+#include "mlrta/trace_output.h"
+#include "traverse/load_packet.h"
+#include "traverse/packet_state.h"
+#include "traverse/single.h"
+#include "traverse/wide.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace mlrt {
+
+// The wide tree, where rays that go alone are to take it and it is there.
+inline const WideTree *wide_tree_for(const KdTree &tree, const TraceOptions &options) {
+    const bool wanted =
+        options.traversal == Traversal::adaptive || options.traversal == Traversal::wide;
+    return wanted ? tree.widening->tree() : nullptr;
+}
+
+template <typename Origin, typename Output>
+class WideTracer {
+public:
+    WideTracer(const KdTree &tree, const WideTree &wide, const RayGroup &rays,
+               Output output, Counters &counters)
+        : tree_(tree), wide_(wide), rays_(rays), output_(output), counters_(counters) {}
+
+    // Traces a run of rays.
+    void trace(uint32_t first, uint32_t count) {
+        // What the rays take is shared by those that are next to each other.
+        const uint32_t most = rays_.cost ? PACKET_WIDTH : WideRays::MOST;
+        for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
+            add(i, first_lanes(first + count - i));
+            if (waiting_.count + PACKET_WIDTH > most)
+                flush();
+        }
+        flush();
+    }
+
+    // Traces those of sixteen rays from `first` on whose bit is set, now or with the next
+    // ones: flush() waits for them.
+    void add(uint32_t first, LaneBits lanes) {
+        auto [packet, extreme] = load_packet<Origin>(rays_, first);
+        LaneBits active = packet.active & lanes;
+        counters_.rays += uint64_t(std::popcount((packet.active | extreme) & lanes));
+        for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
+        if (active != 0)
+            active &= ~stopped_again(packet, active, first);
+        if (active == 0)
+            return;
+        if (!waiting_.has_room())
+            flush();
+        waiting_.add(packet, active, first);
+    }
+
+    void flush() {
+        if (waiting_.count == 0)
+            return;
+        std::array<Hit, WideRays::MOST> hits;
+        RayCost cost(rays_, counters_);
+        trace_wide(wide_, waiting_, Output::query, hits.data(), counters_);
+        const float share = cost.share(waiting_.count);
+        for (uint32_t i = 0; i < waiting_.count; ++i) {
+            if (share > 0)
+                rays_.cost[waiting_.number[i]] += share;
+            if (hits[i].primitive == NO_PRIMITIVE)
+                continue;
+            output_.set(waiting_.number[i], hits[i]);
+            occluder_ = hits[i].primitive;
+        }
+        waiting_.count = 0;
+    }
+
+private:
+    // By X1.
+    void trace_extreme(uint32_t i) {
+        Ray ray;
+        ray.origin = rays_.common_origin;
+        for (int k = 0; k < 3; ++k) {
+            if constexpr (std::is_same_v<Origin, LaneOrigins>)
+                ray.origin[k] = rays_.origin[k][i];
+            ray.direction[k] = rays_.direction[k][i];
+        }
+        ray.t_min = std::max(rays_.t_min[i], 0.0f);
+        ray.t_max = rays_.t_max[i];
+        RayCost cost(rays_, counters_);
+        output_.set(i,
+                    trace_single(tree_, ray, Output::query, root_entry(tree_), counters_));
+        cost.add_to_run(i, 1);
+    }
+
+    // Of Query::any, the rays that stop where one did before: neighbours often do.
+    LaneBits stopped_again(const RayPacket<Origin> &packet, LaneBits lanes,
+                           uint32_t first) {
+        if (Output::query == Query::closest || occluder_ == NO_PRIMITIVE)
+            return 0;
+        PacketState<Output::query> state(packet);
+        state.test(packet, lanes, tree_.triangles[occluder_], occluder_, counters_);
+        output_.set(first, lanes, state);
+        return state.hits.found & lanes;
+    }
+
+    const KdTree &tree_;
+    const WideTree &wide_;
+    const RayGroup &rays_;
+    Output output_;
+    Counters &counters_;
+    WideRays waiting_;
+    uint32_t occluder_ = NO_PRIMITIVE; // that stopped rays, of Query::any
+};
+
+} // namespace mlrt
