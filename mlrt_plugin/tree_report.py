@@ -27,7 +27,8 @@ def tree_report(tree: Any) -> dict[str, Any]:
     rules 1, 2 and 3. expected_traversals, expected_leaf_visits and
     expected_primitive_visits of a line that crosses the root's cell, and sah_cost, its
     expected cost in units of one traversal. node_bytes, reference_bytes, triangle_bytes,
-    waiting_bytes that are kept to build the rest of a lazy tree, and their sum total_bytes.
+    waiting_bytes that are kept to build the rest of a lazy tree, wide_bytes of the form for
+    rays that go alone, 0 as long as there is none, and their sum total_bytes.
     seconds that building took, once, and of its phases.
 
     Of a lazy tree the figures are those of the part that is built; of its seconds, those
@@ -60,6 +61,7 @@ def tree_report(tree: Any) -> dict[str, Any]:
         + report["reference_bytes"]
         + report["triangle_bytes"]
         + report["waiting_bytes"]
+        + report["wide_bytes"]
     )
     return report
 
@@ -126,6 +128,8 @@ def report_lines(report: dict[str, Any]) -> list[str]:
             f"{count}({leaves})" for count, leaves in enumerate(report["leaf_histogram"])
         ),
     }
+    if report["wide_bytes"]:
+        structure["Form for rays alone"] = size(report["wide_bytes"])
     if report["unbuilt_cells"]:
         structure["Built so far"] = (
             f"{100 * report['built_share']:.1f} %; {report['unbuilt_references']} "

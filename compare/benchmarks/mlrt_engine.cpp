@@ -47,25 +47,21 @@ TileRays &rays_of_thread() {
 Vec3<FloatPacket> normals(const KdTree &tree, const uint32_t *primitives, LaneBits lanes) {
     // Mostly one triangle covers a packet.
     const uint32_t first = primitives[std::countr_zero(lanes)];
-    if (to_bits(load<UIntPacket>(primitives) == first) == lanes) {
+    const auto hit = load<UIntPacket>(primitives);
+    if (to_bits(hit == first) == lanes) {
         const Triangle &triangle = tree.triangles[first];
         return in_all_lanes(cross(triangle.b - triangle.a, triangle.c - triangle.a));
     }
-    LaneArray<float> along[2][3]{};
-    for_each_lane(lanes, [&](uint32_t lane) {
-        const Triangle &triangle = tree.triangles[primitives[lane]];
-        const Vec3f to_b = triangle.b - triangle.a, to_c = triangle.c - triangle.a;
-        for (int k = 0; k < 3; ++k) {
-            along[0][k][lane] = to_b[k];
-            along[1][k][lane] = to_c[k];
-        }
-    });
-    Vec3<FloatPacket> to_b, to_c;
-    for (int k = 0; k < 3; ++k) {
-        to_b[k] = load<FloatPacket>(along[0][k]);
-        to_c[k] = load<FloatPacket>(along[1][k]);
-    }
-    return cross(to_b, to_c);
+    constexpr uint32_t FLOATS = sizeof(Triangle) / sizeof(float);
+    const UIntPacket place =
+        select(from_bits<UIntPacket>(lanes), hit, UIntPacket(first)) * FLOATS;
+    const auto vertex = [&](uint32_t number) {
+        return by_axis([&](int k) {
+            return gather(&tree.triangles[0].a.x, place + UIntPacket(3 * number + k));
+        });
+    };
+    const Vec3<FloatPacket> a = vertex(0);
+    return cross(vertex(1) - a, vertex(2) - a);
 }
 
 class TileRenderer {

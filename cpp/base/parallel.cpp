@@ -1,6 +1,6 @@
 #include "base/parallel.h"
 
-#include "base/simd.h"
+#include "base/denormals.h"
 
 #include <atomic>
 #include <exception>

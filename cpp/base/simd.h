@@ -178,28 +178,6 @@ inline float greatest_lane(const FloatPacket &a) {
     return drjit::max(a);
 }
 
-// In the lowest bits of each lane four bits of a word, the lowest ones in lane 0; what lies
-// above them is undefined.
-inline UIntBlock four_bits_each(uint32_t word) {
-    return UIntBlock(word) >> (drjit::arange<UIntBlock>() * 4u);
-}
-
-// block[order[lane]] in each lane; only the lowest three bits of an order count.
-template <typename Block>
-Block permuted(const Block &block, const UIntBlock &order) {
-#if defined(__AVX2__)
-    if constexpr (std::is_same_v<Block, FloatBlock>)
-        return Block(_mm256_permutevar8x32_ps(block.m, order.m));
-    else
-        return Block(_mm256_permutevar8x32_epi32(block.m, order.m));
-#else
-    Block result;
-    for (uint32_t lane = 0; lane < BLOCK_WIDTH; ++lane)
-        result.entry(lane) = block.entry(order.entry(lane) & (BLOCK_WIDTH - 1));
-    return result;
-#endif
-}
-
 inline float sum_of_lanes(const FloatPacket &a) {
     return drjit::sum(a);
 }
@@ -415,11 +393,5 @@ inline Vec3<DoublePacket> to_double(const Vec3<FloatPacket> &v) {
 // The type that to_double() gives.
 template <typename Real>
 using DoubleOf = decltype(to_double(std::declval<Real>()));
-
-// Keeps denormal numbers while it lives: Dr.Jit's threads flush them to zero.
-class KeepDenormals {
-private:
-    drjit::scoped_flush_denormals scope_{false};
-};
 
 } // namespace mlrt

@@ -13,6 +13,7 @@ void bind_numerics(nanobind::module_ &m);
 void bind_objects(nanobind::module_ &m);
 void bind_render(nanobind::module_ &m);
 void bind_render_selftest(nanobind::module_ &m);
+void bind_wide_selftest(nanobind::module_ &m);
 void bind_scene(nanobind::module_ &m);
 void bind_tree(nanobind::module_ &m);
 void bind_tree_files(nanobind::module_ &m);

@@ -1,4 +1,5 @@
 // What the tests ask of the parts of the beam-leaf traversal.
+#include "base/denormals.h"
 #include "bind/bind.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/regroup.h"
@@ -49,17 +50,18 @@ private:
 nb::dict describe(const BeamUnderTest &self) {
     const BeamPackets &beam = self.beam;
     const SlopeRectangle &r = beam.rectangle;
-    const LaneArray<float> center_p = to_lanes<float>(beam.center_p);
-    const LaneArray<float> center_q = to_lanes<float>(beam.center_q);
-    const LaneArray<float> half_p = to_lanes<float>(beam.half_p);
-    const LaneArray<float> half_q = to_lanes<float>(beam.half_q);
     nb::list packets;
     for (uint32_t n = 0; n < beam.count; ++n) {
         const BeamPacket &packet = beam.packets[n];
         nb::dict one;
         one["active"] = packet.active;
         one["strays"] = packet.strays;
-        one["box"] = std::array{center_p[n], center_q[n], half_p[n], half_q[n]};
+        const BeamPackets::Run &run = beam.runs[n / PACKET_WIDTH];
+        const auto lane = [&](const FloatPacket &packets) {
+            return to_lanes<float>(packets)[n % PACKET_WIDTH];
+        };
+        one["box"] = std::array{lane(run.center_p), lane(run.center_q), lane(run.half_p),
+                                lane(run.half_q)};
         packets.append(one);
     }
     nb::dict dict;
@@ -99,6 +101,10 @@ nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
     nb::dict dict;
     dict["possible"] = forms.possible;
     dict["unsafe"] = forms.unsafe;
+    nb::list within;
+    for (uint32_t n = 0; n < self.beam.run_count(); ++n)
+        within.append(forms.possible_for(self.beam.runs[n]));
+    dict["possible_for_runs"] = within;
     nb::list values;
     for (int form = 0; form < 4; ++form)
         values.append(nb::make_tuple(lanes_of(forms.constant[form]),

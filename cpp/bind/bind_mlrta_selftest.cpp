@@ -1,5 +1,6 @@
 // What the tests ask of single components of the tracer: decisions, beams, culling, entry
 // points.
+#include "base/denormals.h"
 #include "bind/bind.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"

@@ -4,6 +4,7 @@
 #include "bind/scene_handle.h"
 #include "render/camera.h"
 #include "render/emitter_sampling.h"
+#include "render/face_cache.h"
 #include "render/film_blocks.h"
 #include "render/picture_film.h"
 #include "render/sampler.h"
@@ -175,8 +176,9 @@ nb::dict hit_packet(const SceneHandle &handle, const Vectors &origins,
         faces[lane] = primitives.at(lane);
     const Vec3<FloatPacket> o = packet_of(origins), d = packet_of(directions);
     const Vec2<FloatPacket> at = barycentrics_of(o, d, corners_of(*handle.scene, faces));
+    FaceCache cache(*handle.scene, {});
     const SurfacePoint<FloatPacket> point =
-        hit_surfaces(*handle.scene, o, d, load<UIntPacket>(faces), ALL_LANES);
+        hit_surfaces(cache, &o, d, load<UIntPacket>(faces), ALL_LANES);
     nb::dict result;
     result["weights"] = vectors_of({at.x, at.y, FloatPacket(0.0f)});
     result["p"] = vectors_of(point.p);
@@ -190,18 +192,17 @@ nb::dict emitter_packet(const SceneHandle &handle, const Vectors &points,
     const Vec3<FloatPacket> p = packet_of(points), random = packet_of(numbers);
     const EmitterChoices choices = choose_emitters(*handle.scene, random.x);
     Vectors weight(PACKET_WIDTH), direction(PACKET_WIDTH), target(PACKET_WIDTH);
-    for_each_value(choices.emitter, ALL_LANES, [&](uint32_t emitter, LaneBits lanes) {
-        const EmitterSample<FloatPacket> sample =
-            sample_chosen(*handle.scene, emitter, choices, p, random.y);
-        const Vectors weights = vectors_of(sample.weight);
-        const Vectors directions = vectors_of(sample.direction);
-        const Vectors targets = vectors_of(sample.target);
-        for_each_lane(lanes, [&](uint32_t lane) {
-            weight[lane] = weights[lane];
-            direction[lane] = directions[lane];
-            target[lane] = targets[lane];
-        });
-    });
+    for_each_light(*handle.scene, choices, ALL_LANES, p, random.y,
+                   [&](uint32_t, LaneBits lanes, const EmitterSample<FloatPacket> &sample) {
+                       const Vectors weights = vectors_of(sample.weight);
+                       const Vectors directions = vectors_of(sample.direction);
+                       const Vectors targets = vectors_of(sample.target);
+                       for_each_lane(lanes, [&](uint32_t lane) {
+                           weight[lane] = weights[lane];
+                           direction[lane] = directions[lane];
+                           target[lane] = targets[lane];
+                       });
+                   });
     const LaneArray<uint32_t> emitters = to_lanes<uint32_t>(choices.emitter);
     nb::dict result;
     result["weight"] = weight;

@@ -128,6 +128,8 @@ nb::dict statistics(const TreeHandle &self) {
     dict["unbuilt_references"] = found.unbuilt_references;
     const LazyGrowth *growth = self.tree->growth.get();
     dict["waiting_bytes"] = growth ? growth->state().waiting_bytes : 0;
+    const WideTree *wide = self.tree->widening->tree();
+    dict["wide_bytes"] = wide ? wide->bytes() : 0;
     dict["depth"] = found.depth;
     dict["expected_traversals"] = found.expected_traversals;
     dict["expected_leaf_visits"] = found.expected_leaf_visits;

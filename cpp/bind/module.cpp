@@ -14,4 +14,5 @@ NB_MODULE(MLRT_MODULE, m) {
     mlrt::bind_image_plane(m);
     mlrt::bind_render(m);
     mlrt::bind_render_selftest(m);
+    mlrt::bind_wide_selftest(m);
 }

@@ -1,6 +1,6 @@
 #include "kdtree/builder.h"
 
-#include "base/simd.h"
+#include "base/denormals.h"
 #include "geometry/clip.h"
 #include "geometry/degenerate.h"
 #include "kdtree/chunks.h"

@@ -1,7 +1,7 @@
 #include "kdtree/lazy.h"
 
+#include "base/denormals.h"
 #include "base/parallel.h"
-#include "base/simd.h"
 #include "kdtree/relocate.h"
 #include "kdtree/top.h"
 

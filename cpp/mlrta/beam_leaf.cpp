@@ -144,14 +144,16 @@ bool BeamWalk<query>::walk(const Entry &entry) {
         changes[changed++] = {bound, cell_[bound]};
         cell_[bound] = value;
     };
-    uint32_t node_index = entry.node;
     Depths depths{0, INFINITE};
     if (!clip(depths) || depths.near > tests_.far_end() || tests_.all_done())
         return true;
+    KdNode node = tree_.node(entry.node);
     for (;;) {
-        const KdNode node = tree_.node(node_index);
         ++counters_.beam_steps;
         if (!node.is_leaf()) {
+            // Read both before the choice between them is known.
+            const KdNode lower = load_node(tree_.nodes[node.lower_child()]);
+            const KdNode upper = load_node(tree_.nodes[node.lower_child() + 1]);
             const uint32_t axis = uint32_t(node.axis());
             const float distance = node.split() - beam_.origin[int(axis)];
             const bool above = distance < 0;
@@ -174,9 +176,12 @@ bool BeamWalk<query>::walk(const Entry &entry) {
                                   axis + 3 * above,
                                   distance};
                 pending += uint32_t(enter_near & enter_far);
-                node_index = node.lower_child() + !to_lower;
+                const uint32_t index = node.lower_child() + !to_lower;
                 depths.far = enter_near ? minimum(last, depths.far) : depths.far;
                 change(axis + 3 * to_lower, distance);
+                node = chosen(!to_lower, lower, upper);
+                if (node.is_unbuilt()) [[unlikely]]
+                    node = tree_.node(index);
                 continue;
             }
         } else if (node.reference_count() > 0 && !beside()) {
@@ -185,21 +190,25 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             if (tests_.spent())
                 return false;
         }
-        do {
+        for (;;) {
             if (pending == 0)
                 tests_.flush();
             if (pending == 0 || tests_.all_done())
                 return true;
-            --pending;
-        } while (stack[pending].depths.near > tests_.far_end());
-        const Pending &next = stack[pending];
-        while (changed > next.changes) {
-            --changed;
-            cell_[changes[changed].bound] = changes[changed].before;
+            const Pending &next = stack[--pending];
+            if (next.depths.near > tests_.far_end())
+                continue;
+            while (changed > next.changes) {
+                --changed;
+                cell_[changes[changed].bound] = changes[changed].before;
+            }
+            change(next.bound, next.split);
+            if (beside())
+                continue;
+            node = tree_.node(next.node);
+            depths = next.depths;
+            break;
         }
-        change(next.bound, next.split);
-        node_index = next.node;
-        depths = next.depths;
     }
 }
 
@@ -209,8 +218,8 @@ template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
                      BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
                      Counters &counters) {
-    BeamTriangleTests<query> tests(tree, rays, memory.distances, most_triangles, beam,
-                                   counters);
+    BeamTriangleTests<query> tests(tree, rays, memory.distances, memory.mailbox,
+                                   most_triangles, beam, counters);
     bool done = true;
     if (memory.occluder_count > 0)
         tests.test_first({memory.occluders.data(), memory.occluder_count});

@@ -10,6 +10,7 @@
 #include "mlrta/beam_packets.h"
 #include "mlrta/frontier.h"
 #include "mlrta/hit_distances.h"
+#include "mlrta/mailbox.h"
 
 #include <array>
 #include <cstdint>
@@ -21,7 +22,9 @@ struct BeamMemory {
     BeamMemory(const KdTree &tree, Vec3f origin) : distances(tree, origin) {}
 
     HitDistances distances;
-    float triangles_per_ray = 0; // tested against the beam; a moving average
+    Mailbox mailbox;
+    BeamPackets beam;            // the one that is traced
+    float triangles_per_ray = 0; // tested against beams; a moving average
 
     // Triangles that stopped rays of the last beam, of Query::any: they are likely to stop
     // those of the next one too, and tested first.

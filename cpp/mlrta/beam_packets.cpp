@@ -162,38 +162,46 @@ void BeamPackets::fit_rectangle() {
     const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
     // Packets that are missing, and lanes that are not active, bound nothing.
     const FloatPacket none_lo(INFINITE), none_hi(-INFINITE);
-    PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
-    const auto leave_out = [&](uint32_t n) {
-        lo_p[n] = lo_q[n] = least_of[n] = none_lo;
-        hi_p[n] = hi_q[n] = none_hi;
+    FloatPacket lo_u = none_lo, hi_u = none_hi, lo_v = none_lo, hi_v = none_hi;
+    // Of each packet of a run, a lane each.
+    struct Extents {
+        FloatPacket p0, p1, q0, q1;
     };
-    for (uint32_t n = count; n < CAPACITY; ++n)
-        leave_out(n);
-    FloatPacket lo_u = INFINITE, hi_u = -INFINITE, lo_v = INFINITE, hi_v = -INFINITE;
-    for (uint32_t n = 0; n < count; ++n) {
-        const BeamPacket &packet = packets[n];
-        if (packet.active == 0) {
-            leave_out(n);
-            continue;
+    std::array<Extents, RUNS> extents;
+    Extents widest{none_lo, none_hi, none_lo, none_hi};
+    for (uint32_t r = 0; r < run_count(); ++r) {
+        PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
+        for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
+            const uint32_t n = r * PACKET_WIDTH + i;
+            if (n >= count || packets[n].active == 0) {
+                lo_p[i] = lo_q[i] = least_of[i] = none_lo;
+                hi_p[i] = hi_q[i] = none_hi;
+                continue;
+            }
+            const BeamPacket &packet = packets[n];
+            const auto active = from_bits<FloatPacket>(packet.active);
+            // Inactive lanes repeat the first ray of all.
+            const FloatPacket u = select(active, packet.u, first_u);
+            const FloatPacket v = select(active, packet.v, first_v);
+            lo_u = minimum(u, lo_u);
+            hi_u = maximum(u, hi_u);
+            lo_v = minimum(v, lo_v);
+            hi_v = maximum(v, hi_v);
+            const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
+            const FloatPacket p = fused(du, FloatPacket(c), dv * s);
+            const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
+            lo_p[i] = select(active, p, none_lo);
+            hi_p[i] = select(active, p, none_hi);
+            lo_q[i] = select(active, q, none_lo);
+            hi_q[i] = select(active, q, none_hi);
+            least_of[i] = packet.least;
         }
-        const auto active = from_bits<FloatPacket>(packet.active);
-        // Inactive lanes repeat the first ray of all.
-        const FloatPacket u = select(active, packet.u, first_u);
-        const FloatPacket v = select(active, packet.v, first_v);
-        lo_u = minimum(u, lo_u);
-        hi_u = maximum(u, hi_u);
-        lo_v = minimum(v, lo_v);
-        hi_v = maximum(v, hi_v);
-        const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
-        const FloatPacket p = fused(du, FloatPacket(c), dv * s);
-        const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
-        lo_p[n] = select(active, p, none_lo);
-        hi_p[n] = select(active, p, none_hi);
-        lo_q[n] = select(active, q, none_lo);
-        hi_q[n] = select(active, q, none_hi);
-        least_of[n] = packet.least;
+        store(runs[r].least.data(), least_lanes(least_of));
+        const Extents &of_run = extents[r] = {least_lanes(lo_p), greatest_lanes(hi_p),
+                                              least_lanes(lo_q), greatest_lanes(hi_q)};
+        widest = {minimum(of_run.p0, widest.p0), maximum(of_run.p1, widest.p1),
+                  minimum(of_run.q0, widest.q0), maximum(of_run.q1, widest.q1)};
     }
-    store(least.data(), least_lanes(least_of));
     slope_lo[0] = least_lane(lo_u);
     slope_hi[0] = greatest_lane(hi_u);
     slope_lo[1] = least_lane(lo_v);
@@ -201,10 +209,8 @@ void BeamPackets::fit_rectangle() {
     const float size_u = std::max(std::abs(slope_lo[0]), std::abs(slope_hi[0]));
     const float size_v = std::max(std::abs(slope_lo[1]), std::abs(slope_hi[1]));
 
-    const FloatPacket p0 = least_lanes(lo_p), p1 = greatest_lanes(hi_p);
-    const FloatPacket q0 = least_lanes(lo_q), q1 = greatest_lanes(hi_q);
-    const float beam_p0 = least_lane(p0), beam_p1 = greatest_lane(p1);
-    const float beam_q0 = least_lane(q0), beam_q1 = greatest_lane(q1);
+    const float beam_p0 = least_lane(widest.p0), beam_p1 = greatest_lane(widest.p1);
+    const float beam_q0 = least_lane(widest.q0), beam_q1 = greatest_lane(widest.q1);
     const float mid_p = 0.5f * (beam_p0 + beam_p1), mid_q = 0.5f * (beam_q0 + beam_q1);
     rectangle.center_u += mid_p * c - mid_q * s;
     rectangle.center_v += mid_p * s + mid_q * c;
@@ -218,11 +224,20 @@ void BeamPackets::fit_rectangle() {
     rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
     greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
                    2 * (rectangle.half_p + rectangle.half_q);
-    // Packets without rays have NaN here, and an infinite `least`.
-    center_p = 0.5f * (p0 + p1) - mid_p;
-    center_q = 0.5f * (q0 + q1) - mid_q;
-    half_p = 0.5f * (p1 - p0) + slack;
-    half_q = 0.5f * (q1 - q0) + slack;
+    // Without rays the center is NaN, the sides are negative, and `least` is infinite.
+    for (uint32_t r = 0; r < run_count(); ++r) {
+        Run &run = runs[r];
+        const auto &[p0, p1, q0, q1] = extents[r];
+        run.center_p = 0.5f * (p0 + p1) - mid_p;
+        run.center_q = 0.5f * (q0 + q1) - mid_q;
+        run.half_p = 0.5f * (p1 - p0) + slack;
+        run.half_q = 0.5f * (q1 - q0) + slack;
+        const float run_p0 = least_lane(p0), run_p1 = greatest_lane(p1);
+        const float run_q0 = least_lane(q0), run_q1 = greatest_lane(q1);
+        run.all = {0.5f * (run_p0 + run_p1) - mid_p, 0.5f * (run_q0 + run_q1) - mid_q,
+                   0.5f * (run_p1 - run_p0) + slack, 0.5f * (run_q1 - run_q0) + slack,
+                   least_lane(mlrt::load<FloatPacket>(run.least))};
+    }
 }
 
 void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,

@@ -44,8 +44,16 @@ struct BeamPacket {
     LaneBits strays;
 };
 
+// Of some rays of a beam, a rectangle parallel to that of the beam and relative to its
+// center, and the smallest `least`, infinite if none is active.
+struct RayBounds {
+    float center_p, center_q, half_p, half_q;
+    float least;
+};
+
 struct BeamPackets {
-    static constexpr uint32_t CAPACITY = PACKET_WIDTH;
+    static constexpr uint32_t RUNS = 4; // of sixteen packets
+    static constexpr uint32_t CAPACITY = RUNS * PACKET_WIDTH;
     static constexpr uint32_t MAX_RAYS = CAPACITY * PACKET_WIDTH;
 
     Vec3f origin;
@@ -60,10 +68,15 @@ struct BeamPackets {
     float slope_lo[2], slope_hi[2];
     float greatest_sum; // of 1 + |u| + |v| in the rectangle
 
-    // Of each packet, a rectangle parallel to that of the beam and relative to its center,
-    // and the smallest `least` of its rays, infinite if none is active.
-    FloatPacket center_p, center_q, half_p, half_q;
-    LaneArray<float> least;
+    // Bounds of sixteen packets side by side, as RayBounds has them, and of all sixteen.
+    struct Run {
+        FloatPacket center_p, center_q, half_p, half_q;
+        LaneArray<float> least;
+        RayBounds all;
+    };
+    std::array<Run, RUNS> runs;
+
+    uint32_t run_count() const { return (count + PACKET_WIDTH - 1) / PACKET_WIDTH; }
 
     // Projects up to MAX_RAYS rays from `first` on, which start at the group's common
     // origin. `camera` made them, if it is given: the rectangle is then turned as the film

@@ -24,16 +24,28 @@ public:
                BeamMemory &memory, uint32_t regroupings = 0)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
-          packets_(tree, rays, options, output, counters), regroupings_(regroupings) {}
+          packets_(tree, rays, options, output, counters), beam_(memory.beam),
+          regroupings_(regroupings) {}
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
-        for (uint32_t i = 0; i < count; i += BeamPackets::MAX_RAYS)
-            trace_beam(first + i, std::min(count - i, BeamPackets::MAX_RAYS), frontier,
-                       camera_ != nullptr);
+        for (uint32_t i = 0; i < count;) {
+            // Aligned, so that beams of both sizes are squares of a camera's rays.
+            const bool large =
+                camera_ || (i % LARGE_BEAM == 0 &&
+                            memory_.triangles_per_ray <= LARGE_TRIANGLES_PER_RAY);
+            const uint32_t rays = std::min(count - i, large ? LARGE_BEAM : SMALL_BEAM);
+            trace_beam(first + i, rays, frontier, camera_ != nullptr);
+            i += rays;
+        }
     }
 
 private:
+    // A large beam shares the walk, and what is made of each triangle, by more rays: it
+    // pays for a camera's rays, and for others that are as close to each other.
+    static constexpr uint32_t LARGE_BEAM = BeamPackets::MAX_RAYS;
+    static constexpr uint32_t SMALL_BEAM = RayNumbers::CAPACITY;
+
     // `ordered` tells that neighbours in the group are neighbours in space as well as
     // regrouping could make them.
     void trace_beam(uint32_t first, uint32_t count, const Frontier &frontier,
@@ -44,12 +56,17 @@ private:
             trace_strays(frontier);
             return;
         }
+        if (count > SMALL_BEAM && (beam.any_stray || (!camera_ && leaves_gaps()))) {
+            for (uint32_t i = 0; i < count; i += SMALL_BEAM)
+                trace_beam(first + i, std::min(count - i, SMALL_BEAM), frontier, ordered);
+            return;
+        }
         if (regroupings_ < MOST_REGROUPINGS) {
             if (beam.any_stray) {
                 set_strays_apart(frontier);
                 return;
             }
-            if (!camera_ && regroup(frontier, ordered))
+            if (!camera_ && count <= SMALL_BEAM && regroup(frontier, ordered))
                 return;
         }
 
@@ -128,16 +145,24 @@ private:
         trace_regrouped(strays, frontier, false);
     }
 
+    // Whether the rays had better be regrouped.
+    bool leaves_gaps() const {
+        const Occupancy occupancy(beam_);
+        return occupancy.best_cut(share_of_parts()) || occupancy.is_disordered(beam_);
+    }
+
+    float share_of_parts() const {
+        return memory_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
+                                                                    : USUAL_SHARE;
+    }
+
     // Traces the parts of a beam whose rays leave a gap as beams of their own, or all in a
     // better order. Returns false if neither helps.
     bool regroup(const Frontier &frontier, bool ordered) {
         if (beam_.count == 1)
             return false;
         const Occupancy occupancy(beam_);
-        const std::optional<Occupancy::Cut> cut = occupancy.best_cut(
-            memory_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
-                                                                 : USUAL_SHARE);
-        if (cut) {
+        if (const auto cut = occupancy.best_cut(share_of_parts())) {
             RayNumbers before, beyond;
             occupancy.divide(beam_, *cut, before, beyond);
             trace_regrouped(before, frontier, ordered);
@@ -172,9 +197,14 @@ private:
     static constexpr float USUAL_SHARE = 0.6f, COSTLY_SHARE = 0.9f;
     static constexpr float COSTLY_TRIANGLES_PER_RAY = 0.3f;
 
+    // Rays that no camera has made are taken as large beams as long as the ones before met
+    // no more triangles than this. Chosen from 0.05 to no limit, and beams of a camera from
+    // that too, by the frames of office, conference, sponza and building.
+    static constexpr float LARGE_TRIANGLES_PER_RAY = 0.1f;
+
     // How often a ray is regrouped. Slopes that fall off as powers do are cut one ray at a
     // time, which would take a beam's rays squared, and as many frames of the stack as it
-    // has rays. Halves take log2(MAX_RAYS / PACKET_WIDTH) cuts; uneven ones a few more.
+    // has rays. Halves take log2(SMALL_BEAM / PACKET_WIDTH) cuts; uneven ones a few more.
     static constexpr uint32_t MOST_REGROUPINGS = 16;
 
     // What a beam may test before it is given up for packets: rays that are far apart have
@@ -193,7 +223,7 @@ private:
     Counters &counters_;
     BeamMemory &memory_;
     PacketTracer<CommonOrigin, Output> packets_;
-    BeamPackets beam_;
+    BeamPackets &beam_;    // kept by the memory, since regrouped rays need it no more
     uint32_t regroupings_; // that these rays come from
 };
 

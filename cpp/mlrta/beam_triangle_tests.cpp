@@ -21,6 +21,18 @@ Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
 }
 
+// Whether two triangles, if both have an area, certainly lie in one plane: one across an
+// axis, or that of the same three vertices. Surfaces that were modelled twice do.
+bool in_one_plane(const Triangle &one, const Triangle &other) {
+    for (int k = 0; k < 3; ++k) {
+        const float at = one.a[k];
+        if (one.b[k] == at && one.c[k] == at)
+            return other.a[k] == at && other.b[k] == at && other.c[k] == at;
+    }
+    const auto is_of_one = [&](Vec3f v) { return v == one.a || v == one.b || v == one.c; };
+    return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
+}
+
 } // namespace
 
 template <Query query>
@@ -87,18 +99,26 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     uint32_t pairs = 0;
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
-    for_each_lane(possible, [&](uint32_t lane) {
-        const LaneBits packets = touched_packets(forms, lane);
-        store_compressed(pairs_.data() + pairs,
-                         lane_indices() + UIntPacket(lane * PACKET_WIDTH), packets);
-        pairs += uint32_t(std::popcount(packets));
-    });
+    const bool one_run = beam_.run_count() == 1;
+    for (uint32_t n = 0; n < beam_.run_count(); ++n) {
+        const BeamPackets::Run &run = beam_.runs[n];
+        const LaneBits triangles = one_run ? possible : possible & forms.possible_for(run);
+        for_each_lane(triangles, [&](uint32_t lane) {
+            const LaneBits packets = forms.packets_for(lane, run);
+            const uint32_t first = lane * BeamPackets::CAPACITY + n * PACKET_WIDTH;
+            store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
+                             packets);
+            pairs += uint32_t(std::popcount(packets));
+        });
+    }
     counters_.triangle_tests += pairs;
-    LaneBits changed = 0, hit = 0;
+    uint64_t changed = 0;
+    LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
-        const uint32_t n = pairs_[i] % PACKET_WIDTH, lane = pairs_[i] / PACKET_WIDTH;
+        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
+                       lane = pairs_[i] / BeamPackets::CAPACITY;
         const LaneBits found = test_packet(beam_.packets[n], forms, lane, numbers[lane]);
-        changed |= found << n;
+        changed |= uint64_t(found) << n;
         hit |= found << lane;
     }
     if constexpr (query == Query::any)
@@ -109,32 +129,6 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     if (changed != 0)
         update_least(changed);
     for_each_lane(forms.unsafe, [&](uint32_t lane) { test_unsafe(numbers[lane]); });
-}
-
-// One triangle against all packets: those in which a ray may hit it, and nearer than what
-// the ray has found.
-template <Query query>
-LaneBits BeamTriangleTests<query>::touched_packets(const TriangleForms &forms,
-                                                   uint32_t lane) const {
-    auto touched = (absolute(beam_.center_p - forms.box_p[lane]) <=
-                    beam_.half_p + forms.box_half_p[lane]) &
-                   (absolute(beam_.center_q - forms.box_q[lane]) <=
-                    beam_.half_q + forms.box_half_q[lane]);
-    const auto greatest = [&](int form) {
-        const FloatPacket of_p(forms.of_p[form][lane]), of_q(forms.of_q[form][lane]);
-        const FloatPacket middle =
-            fused(of_p, beam_.center_p,
-                  fused(of_q, beam_.center_q, FloatPacket(forms.center[form][lane])));
-        return middle + fused(absolute(of_p), beam_.half_p, absolute(of_q) * beam_.half_q);
-    };
-    const FloatPacket edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
-    const FloatPacket depth = greatest(TriangleForms::DEPTH);
-    const FloatPacket highest = EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]),
-                                              FloatPacket(forms.depth_error[lane]))
-                                      : depth;
-    touched &= (edges >= -FloatPacket(EXACT ? forms.edge_error[lane] : 0.0f)) &
-               (highest >= load<FloatPacket>(beam_.least));
-    return to_bits(touched) & ((1u << beam_.count) - 1);
 }
 
 // One triangle against sixteen rays. Returns whether they found something.
@@ -178,6 +172,18 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                                       LaneBits certain_hits, uint32_t primitive) {
+    // In one plane a ray has one distance, and the lower number wins.
+    LaneBits tied = 0;
+    for_each_value(packet.primitive, lanes & packet.found,
+                   [&](uint32_t rival, LaneBits holders) {
+                       if (rival != primitive && !in_one_plane(tree_.triangles[rival],
+                                                               tree_.triangles[primitive]))
+                           return;
+                       if (primitive < rival)
+                           tied |= holders;
+                       else
+                           lanes &= ~holders;
+                   });
     counters_.double_tests += uint64_t(std::popcount(lanes));
     LaneBits hits = lanes & certain_hits;
     for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
@@ -187,13 +193,16 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
+    const UIntPacket number(primitive);
+    tied &= hits;
+    packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
+    hits &= ~tied;
     if (hits == 0)
         return;
 
     const auto distances = [&](LaneBits of, const UIntPacket &primitives) {
         return distances_.of(rays_, packet.first_ray, of, primitives, counters_);
     };
-    const UIntPacket number(primitive);
     const FloatPacket t = distances(hits, number);
     const FloatPacket t_min = load_padded(rays_.t_min, packet.first_ray, rays_.count);
     const FloatPacket t_max = load_padded(rays_.t_max, packet.first_ray, rays_.count);
@@ -236,20 +245,30 @@ void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
         decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
     }
     counters_.triangle_tests += beam_.count;
-    update_least((1u << beam_.count) - 1);
+    update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));
 }
 
 // After some packets have found something.
 template <Query query>
-void BeamTriangleTests<query>::update_least(LaneBits packets) {
-    for_each_lane(packets,
-                  [&](uint32_t n) { beam_.least[n] = least_lane(beam_.packets[n].least); });
+void BeamTriangleTests<query>::update_least(uint64_t packets) {
+    for (uint32_t n = 0; n < beam_.run_count(); ++n, packets >>= PACKET_WIDTH) {
+        const LaneBits changed = LaneBits(packets) & ALL_LANES;
+        if (changed == 0)
+            continue;
+        BeamPackets::Run &run = beam_.runs[n];
+        for_each_lane(changed, [&](uint32_t i) {
+            run.least[i] = least_lane(beam_.packets[n * PACKET_WIDTH + i].least);
+        });
+        run.all.least = least_lane(load<FloatPacket>(run.least));
+    }
     update_least();
 }
 
 template <Query query>
 void BeamTriangleTests<query>::update_least() {
-    least_ = least_lane(load<FloatPacket>(beam_.least));
+    least_ = INFINITY;
+    for (uint32_t n = 0; n < beam_.run_count(); ++n)
+        least_ = std::min(least_, beam_.runs[n].all.least);
     far_end_ = (1 + 4 * FLOAT_ROUNDOFF) / least_;
 }
 

@@ -6,6 +6,7 @@
 #include "kdtree/tree.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/hit_distances.h"
+#include "mlrta/mailbox.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/triangle_forms.h"
 #include "traverse/query.h"
@@ -16,34 +17,17 @@
 
 namespace mlrt {
 
-// Triangles that a beam has been tested against, as far as a small direct-mapped table
-// remembers them.
-class Mailbox {
-public:
-    Mailbox() { entries_.fill(NO_PRIMITIVE); }
-
-    // Whether it was there already; it is from now on.
-    bool put(uint32_t primitive) {
-        uint32_t &entry = entries_[primitive % SIZE];
-        const bool known = entry == primitive;
-        entry = primitive;
-        return known;
-    }
-
-private:
-    static constexpr uint32_t SIZE = 64;
-    std::array<uint32_t, SIZE> entries_;
-};
-
 // Keeps in the beam's packets what its rays have found. The group is the one that the beam
 // was loaded from.
 template <Query query>
 class BeamTriangleTests {
 public:
     BeamTriangleTests(const KdTree &tree, const RayGroup &rays, HitDistances &distances,
-                      uint32_t most_triangles, BeamPackets &beam, Counters &counters)
-        : tree_(tree), rays_(rays), distances_(distances), beam_(beam), counters_(counters),
-          triangles_left_(most_triangles) {
+                      Mailbox &mailbox, uint32_t most_triangles, BeamPackets &beam,
+                      Counters &counters)
+        : tree_(tree), rays_(rays), distances_(distances), mailbox_(mailbox), beam_(beam),
+          counters_(counters), triangles_left_(most_triangles) {
+        mailbox_.clear();
         update_least();
     }
 
@@ -65,33 +49,32 @@ public:
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
-    LaneBits touched_packets(const TriangleForms &forms, uint32_t lane) const;
     bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
     void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                 uint32_t primitive);
-    void update_least(LaneBits packets);
+    void update_least(uint64_t packets);
     void update_least();
 
     const KdTree &tree_;
     const RayGroup &rays_;
     HitDistances &distances_;
+    Mailbox &mailbox_;
     BeamPackets &beam_;
     Counters &counters_;
     uint32_t triangles_left_;
     uint32_t tested_ = 0;
     bool dense_ = false; // whether there are many triangles
     RayGrid grid_;       // where there are
-    // Packets of the beam that triangles of a block may touch: PACKET_WIDTH times the
+    // Packets of the beam that triangles of a block may touch: its CAPACITY times the
     // number of the triangle plus that of the packet. What is written there comes in whole
     // packets.
-    std::array<uint32_t, (WIDE_WIDTH + 1) * PACKET_WIDTH> pairs_;
+    std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
     std::array<uint32_t, WIDE_WIDTH> hit_;
     uint32_t hit_count_ = 0;
-    Mailbox mailbox_;
     float least_ = 0; // of all rays
     float far_end_ = 0;
 };

@@ -26,6 +26,12 @@ namespace mlrt {
 //   bool  found_blocker()             whether one of them was seen to end the beam
 //   bool  reaches(cell)               whether the beam may still get as far as that
 
+// As a value, where ?: would choose between places in memory.
+inline KdNode chosen(bool second, KdNode a, KdNode b) {
+    return std::bit_cast<KdNode>(second ? std::bit_cast<uint64_t>(b)
+                                        : std::bit_cast<uint64_t>(a));
+}
+
 namespace entry_point_detail {
 
 // A node on a path from the start of a search, `depth` nodes below it.
@@ -46,12 +52,6 @@ struct Bifurcation {
 template <typename Cell>
 using BifurcationStack = std::array<Bifurcation<Cell>, MAX_TREE_DEPTH + 1>;
 using NodePath = std::array<uint32_t, MAX_TREE_DEPTH + 1>;
-
-// As a value, where ?: would choose between places in memory.
-inline KdNode chosen(bool second, KdNode a, KdNode b) {
-    return std::bit_cast<KdNode>(second ? std::bit_cast<uint64_t>(b)
-                                        : std::bit_cast<uint64_t>(a));
-}
 
 // Goes down from `place` to the first possible leaf, near children first; pushes what
 // waits. Where a path ends without one the waiting child of the latest bifurcation is

@@ -19,15 +19,22 @@ public:
     HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {}
 
     // Distances at which sixteen rays of a group, from `first_ray` on, meet a triangle
-    // each. The rays in the given lanes must hit it; other lanes hold any value.
+    // each. The rays in the given lanes, one at least, must hit it; other lanes hold any
+    // value.
     FloatPacket of(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                    const UIntPacket &primitives, Counters &counters);
 
 private:
+    // The distance is numerator / normal.d. Relative to it, the error of the quotient is at
+    // most `share`, plus `denominator_share` times the greatest absolute component of d by
+    // the size of the denominator.
     struct Plane {
         uint32_t primitive;
-        TrianglePlane plane;
-        PlaneNumerator<double> numerator;
+        Vec3d normal;
+        double numerator;
+        float share, denominator_share;
+
+        Plane(uint32_t number, const Triangle &triangle, Vec3f origin);
     };
 
     const Plane &plane_of(uint32_t primitive);

@@ -3,7 +3,7 @@
 #include "base/check.h"
 #include "base/morton.h"
 #include "base/simd.h"
-#include "mlrta/beam_packets.h"
+#include "mlrta/regroup.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
 
@@ -49,7 +49,7 @@ struct Extent {
 
 RayOrder::RayOrder(const RayGroup &rays) {
     MLRT_CHECK(rays.count <= MOST_RAYS);
-    if (rays.count <= BeamPackets::MAX_RAYS)
+    if (rays.count <= RayNumbers::CAPACITY)
         return;
     map_to_plane(rays);
     pays_ = is_scattered();
@@ -100,7 +100,7 @@ void RayOrder::map_to_plane(const RayGroup &rays) {
 // Compares the sum of the sides of the rectangles around consecutive rays with that of
 // squares which would tile the rectangle around all.
 bool RayOrder::is_scattered() const {
-    constexpr uint32_t run = BeamPackets::MAX_RAYS;
+    constexpr uint32_t run = RayNumbers::CAPACITY;
     double sides = 0;
     for (uint32_t first = 0; first + run <= count_; first += run) {
         Extent extent;

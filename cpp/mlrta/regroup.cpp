@@ -79,12 +79,14 @@ std::optional<Occupancy::Cut> Occupancy::best_cut(float share) const {
 }
 
 bool Occupancy::is_disordered(const BeamPackets &beam) const {
-    const LaneArray<float> half_p = to_lanes<float>(beam.half_p);
-    const LaneArray<float> half_q = to_lanes<float>(beam.half_q);
-    float area = 0;
-    for (uint32_t n = 0; n < beam.count; ++n)
-        if (beam.packets[n].active != 0)
-            area += half_p[n] * half_q[n];
+    FloatPacket areas = 0.0f;
+    for (uint32_t n = 0; n < beam.run_count(); ++n) {
+        const BeamPackets::Run &run = beam.runs[n];
+        // Packets without rays have negative sides.
+        areas =
+            areas + select(run.half_p >= 0.0f, run.half_p * run.half_q, FloatPacket(0.0f));
+    }
+    const float area = sum_of_lanes(areas);
     const SlopeRectangle &r = beam.rectangle;
     return area >
            DISORDER * r.half_p * r.half_q * float(std::popcount(cells_)) / (SIDE * SIDE);

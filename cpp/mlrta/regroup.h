@@ -13,7 +13,9 @@ namespace mlrt {
 // Some rays of a beam, by number in the group that it was loaded from. What is written
 // there comes in whole packets.
 struct RayNumbers {
-    std::array<uint32_t, BeamPackets::MAX_RAYS + PACKET_WIDTH> number;
+    static constexpr uint32_t CAPACITY = 256;
+
+    std::array<uint32_t, CAPACITY + PACKET_WIDTH> number;
     uint32_t count = 0;
 
     // Those of sixteen rays from `first` on whose bit is set.
@@ -55,10 +57,10 @@ private:
 
 // Rays in an order of their own, and their numbers in the group that they are taken from.
 struct RegroupedRays {
-    std::array<std::array<float, BeamPackets::MAX_RAYS>, 3> direction;
-    std::array<float, BeamPackets::MAX_RAYS> t_min, t_max;
-    std::array<float, BeamPackets::MAX_RAYS> cost;
-    std::array<uint32_t, BeamPackets::MAX_RAYS> number;
+    std::array<std::array<float, RayNumbers::CAPACITY>, 3> direction;
+    std::array<float, RayNumbers::CAPACITY> t_min, t_max;
+    std::array<float, RayNumbers::CAPACITY> cost;
+    std::array<uint32_t, RayNumbers::CAPACITY> number;
     uint32_t count;
 
     RegroupedRays(const RayGroup &rays, const RayNumbers &numbers);

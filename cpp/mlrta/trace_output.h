@@ -43,8 +43,8 @@ struct ClosestOutput {
 
     // Room for the answers of rays that were regrouped.
     struct Buffer {
-        std::array<float, BeamPackets::MAX_RAYS> t;
-        std::array<uint32_t, BeamPackets::MAX_RAYS> primitive;
+        std::array<float, RayNumbers::CAPACITY> t;
+        std::array<uint32_t, RayNumbers::CAPACITY> primitive;
     };
     ClosestOutput into(Buffer &buffer) const {
         return {{wants_distances() ? buffer.t.data() : nullptr, buffer.primitive.data()}};
@@ -85,7 +85,7 @@ struct AnyOutput {
     }
 
     struct Buffer {
-        std::array<uint8_t, BeamPackets::MAX_RAYS> occluded;
+        std::array<uint8_t, RayNumbers::CAPACITY> occluded;
     };
     AnyOutput into(Buffer &buffer) const { return {buffer.occluded.data()}; }
     void set(const RegroupedRays &rays, const Buffer &buffer) {

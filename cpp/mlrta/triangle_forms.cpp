@@ -168,12 +168,53 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     possible = to_bits(inside) & safe_bits;
 }
 
+// Whether rays within a rectangle may hit a triangle, nearer than `least`: one triangle and
+// rectangles side by side, or the other way round.
+template <typename Real, typename Bounds, typename ValueOf>
+MaskOf<Real> TriangleForms::may_hit(const Bounds &bounds, const Real &least,
+                                    ValueOf &&value_of) const {
+    const Real center_p(bounds.center_p), center_q(bounds.center_q);
+    const Real half_p(bounds.half_p), half_q(bounds.half_q);
+    const auto touched =
+        (absolute(center_p - value_of(box_p)) <= half_p + value_of(box_half_p)) &
+        (absolute(center_q - value_of(box_q)) <= half_q + value_of(box_half_q));
+    const auto greatest = [&](int form) {
+        const Real p = value_of(of_p[form]), q = value_of(of_q[form]);
+        const Real middle = fused(p, center_p, fused(q, center_q, value_of(center[form])));
+        return middle + fused(absolute(p), half_p, absolute(q) * half_q);
+    };
+    const Real edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
+    const Real depth = greatest(DEPTH);
+    if constexpr (!EXACT)
+        return touched & (edges >= 0.0f) & (depth >= least);
+    const Real highest = fused(depth, value_of(depth_grow), value_of(depth_error));
+    return touched & (edges >= -value_of(edge_error)) & (highest >= least);
+}
+
+LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) const {
+    return to_bits(may_hit(run, load<FloatPacket>(run.least), [lane](const Lanes &lanes) {
+        return FloatPacket(lanes[lane]);
+    }));
+}
+
+template <typename Real>
+LaneBits TriangleForms::block_for(const RayBounds &bounds) const {
+    return to_bits(may_hit(bounds, Real(bounds.least),
+                           [](const Lanes &lanes) { return load<Real>(lanes); }));
+}
+
+LaneBits TriangleForms::possible_for(const BeamPackets::Run &run) const {
+    return possible &
+           (wide_ ? block_for<FloatWide>(run.all) : block_for<FloatBlock>(run.all));
+}
+
 void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
                         const uint32_t *numbers, uint32_t count) {
-    if (count <= BLOCK_WIDTH)
-        set_block<FloatBlock>(beam, least, triangles, numbers, count);
-    else
+    wide_ = count > BLOCK_WIDTH;
+    if (wide_)
         set_block<FloatWide>(beam, least, triangles, numbers, count);
+    else
+        set_block<FloatBlock>(beam, least, triangles, numbers, count);
 }
 
 } // namespace mlrt

@@ -48,10 +48,21 @@ struct alignas(64) TriangleForms {
     void set(const BeamPackets &beam, float least, const Triangle *triangles,
              const uint32_t *numbers, uint32_t count);
 
+    // Packets of a run that triangle `lane` may be hit by, nearer than their rays already
+    // have; and of the possible triangles those that any packet of the run may hit so.
+    LaneBits packets_for(uint32_t lane, const BeamPackets::Run &run) const;
+    LaneBits possible_for(const BeamPackets::Run &run) const;
+
 private:
+    template <typename Real, typename Bounds, typename ValueOf>
+    MaskOf<Real> may_hit(const Bounds &bounds, const Real &least, ValueOf &&value_of) const;
+    template <typename Real>
+    LaneBits block_for(const RayBounds &bounds) const;
     template <typename Real>
     void set_block(const BeamPackets &beam, float least, const Triangle *triangles,
                    const uint32_t *numbers, uint32_t count);
+
+    bool wide_ = false; // whether there are more than a narrow block
 };
 
 } // namespace mlrt

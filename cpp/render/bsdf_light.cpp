@@ -64,7 +64,7 @@ void TileRenderer::add_weighted_sample(const HitPacket &hit,
                                   cos_light;
         const ShadowSegment<FloatPacket> segment =
             shadow_segment(scene_, offset_, hit, point, emitter, light);
-        shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
+        shadows_[emitter].append(lit, hit, segment.start, segment.target,
                                  (scattering.albedo * share) * light.weight);
     });
 }

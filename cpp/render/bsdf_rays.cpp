@@ -1,5 +1,6 @@
 #include "render/bsdf_rays.h"
 
+#include "base/lane_bits.h"
 #include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
 #include "render/emitter_density.h"
@@ -54,7 +55,7 @@ void BsdfRays::append(const BsdfSamples &samples, const UIntPacket &ray,
     count_ += uint32_t(std::popcount(samples.lanes));
 }
 
-void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float *cost) {
+RayGroup BsdfRays::group(float *cost) {
     RayGroup rays;
     rays.count = count_;
     for (int k = 0; k < 3; ++k) {
@@ -67,6 +68,47 @@ void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float 
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();
     }
+    return rays;
+}
+
+void BsdfRays::add_cost(float *cost) const {
+    for (uint32_t i = 0; cost && i < count_; ++i)
+        cost[ray_[i]] += cost_[i];
+}
+
+// Where light comes from faces only, rays that would meet none that glows if nothing were
+// in their way.
+void BsdfRays::leave_out_dark(const TraceOptions &options, Counters &counters,
+                              float *cost) {
+    if (!looks_for_light_first(scene_))
+        return;
+    const GlowingFaces &glowing = *scene_.glowing;
+    const RayGroup rays = group(cost);
+    trace_any(*glowing.tree, rays, options, blocked_.data(), counters);
+    if (glowing.objects)
+        trace_any_objects(*glowing.objects, rays, blocked_.data(), counters);
+    add_cost(cost);
+    std::vector<float> *const arrays[] = {
+        &start_[0],  &start_[1],     &start_[2],     &p_[0],         &p_[1],
+        &p_[2],      &direction_[0], &direction_[1], &direction_[2], &weight_[0],
+        &weight_[1], &weight_[2],    &density_};
+    uint32_t left = 0;
+    for (uint32_t first = 0; first < count_; first += PACKET_WIDTH) {
+        const LaneBits bright = first_lanes(count_ - first) & ~zero_bytes(&blocked_[first]);
+        if (bright == 0)
+            continue;
+        store_compressed(&ray_[left], load<UIntPacket>(&ray_[first]), bright);
+        for (std::vector<float> *array : arrays)
+            store_compressed(array->data() + left, load<FloatPacket>(array->data() + first),
+                             bright);
+        left += uint32_t(std::popcount(bright));
+    }
+    count_ = left;
+    counters.rays -= left; // which are counted when they are traced
+}
+
+void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float *cost) {
+    const RayGroup rays = group(cost);
     const SceneData &scene = scene_.data;
     if (!scene_.any_shape_glows) {
         trace_any_unordered(*scene.tree, rays, options, blocked_.data(), counters);
@@ -79,8 +121,7 @@ void BsdfRays::find_hits(const TraceOptions &options, Counters &counters, float 
             trace_closest_objects(*scene.objects, rays,
                                   {hits.t, hits.primitive, instance_.data()}, counters);
     }
-    for (uint32_t i = 0; cost && i < count_; ++i)
-        cost[ray_[i]] += cost_[i];
+    add_cost(cost);
 }
 
 Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t first) const {
@@ -88,7 +129,7 @@ Vec3<FloatPacket> BsdfRays::vector(const std::vector<float> (&of)[3], size_t fir
             load<FloatPacket>(&of[2][first])};
 }
 
-Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const {
+Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) {
     const FloatPacket zero(0.0f);
     Vec3<FloatPacket> light = in_all_lanes({});
     LaneArray<uint32_t> emitters, shape_numbers;
@@ -110,7 +151,7 @@ Vec3<FloatPacket> BsdfRays::light_from_shapes(size_t first, LaneBits hits) const
         hit.t = load<FloatPacket>(&t_[first]);
         hit.instances = load<UIntPacket>(&instance_[first]);
     }
-    const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, false);
+    const SurfacePoint<FloatPacket> point = surface_of(scene_, faces_, hit, false);
     const Vec3<FloatPacket> from = vector(p_, first);
     const UIntPacket shapes = load<UIntPacket>(shape_numbers);
     const FloatPacket own =
@@ -152,18 +193,18 @@ Vec3<FloatPacket> BsdfRays::light_from_around(size_t first, LaneBits misses) con
 
 void BsdfRays::trace(const TraceOptions &options, Counters &counters, float *cost,
                      std::span<float *const, 3> colours) {
+    if (count_ > 0)
+        leave_out_dark(options, counters, cost);
     if (count_ == 0)
         return;
     find_hits(options, counters, cost);
     for (size_t first = 0; first < count_; first += PACKET_WIDTH) {
         const LaneBits lanes = first_lanes(count_ - uint32_t(first));
-        LaneBits misses = 0;
-        for_each_lane(lanes, [&](uint32_t lane) {
-            const bool miss = scene_.any_shape_glows
-                                  ? primitive_[first + lane] == NO_PRIMITIVE
-                                  : blocked_[first + lane] == 0;
-            misses |= LaneBits(miss) << lane;
-        });
+        const LaneBits misses =
+            lanes &
+            (scene_.any_shape_glows
+                 ? to_bits(load<UIntPacket>(&primitive_[first]) == UIntPacket(NO_PRIMITIVE))
+                 : zero_bytes(&blocked_[first]));
         Vec3<FloatPacket> light = in_all_lanes({});
         if (scene_.any_shape_glows && misses != lanes)
             light = light_from_shapes(first, lanes & ~misses);

@@ -5,6 +5,7 @@
 #include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/bsdf_sampling.h"
+#include "render/face_cache.h"
 #include "render/prepared_scene.h"
 
 #include <cstdint>
@@ -23,12 +24,17 @@ struct SampleShares {
     SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples);
 };
 
+// Whether rays are only traced if they meet something that glows.
+inline bool looks_for_light_first(const PreparedScene &scene) {
+    return scene.glowing && !scene.environment.exists();
+}
+
 // Rays in no order. What they bring back is weighed by the power heuristic against emitter
 // samples.
 class BsdfRays {
 public:
     BsdfRays(const PreparedScene &scene, const SampleShares &shares)
-        : scene_(scene), shares_(shares) {}
+        : scene_(scene), shares_(shares), faces_(scene, scene.plane.origin) {}
 
     void clear() { count_ = 0; }
 
@@ -44,13 +50,17 @@ public:
 
 private:
     void reserve(size_t size);
+    RayGroup group(float *cost);
+    void add_cost(float *cost) const;
+    void leave_out_dark(const TraceOptions &options, Counters &counters, float *cost);
     void find_hits(const TraceOptions &options, Counters &counters, float *cost);
-    Vec3<FloatPacket> light_from_shapes(size_t first, LaneBits hits) const;
+    Vec3<FloatPacket> light_from_shapes(size_t first, LaneBits hits);
     Vec3<FloatPacket> light_from_around(size_t first, LaneBits misses) const;
     Vec3<FloatPacket> vector(const std::vector<float> (&of)[3], size_t first) const;
 
     const PreparedScene &scene_;
     SampleShares shares_;
+    FaceCache faces_;
     uint32_t count_ = 0;
     // One array a component, with room for a packet behind the last entry.
     std::vector<uint32_t> ray_;

@@ -124,6 +124,8 @@ void CameraSamples::make_room_for_numbers(size_t padded) {
         if (sample < wanted_.light_samples)
             pairs_.push_back({light_x_[sample].data(), light_y_[sample].data()});
     }
+    if (leaves_out_last())
+        pairs_.back().y = nullptr;
     for (BsdfNumbers &numbers : bsdf_) {
         for (std::vector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
             array->resize(padded);
@@ -141,6 +143,14 @@ const float *CameraSamples::delta_part(uint32_t sample) const {
     const uint32_t rest = number - of_lights;
     const BsdfNumbers &numbers = bsdf_[rest / 3];
     return (rest % 3 == 0 ? numbers.x : rest % 3 == 1 ? numbers.y : numbers.part).data();
+}
+
+// Whether the last number that there is of each sample need not be drawn: the second one of
+// a light, which only chooses the light. Other samplers do not draw one number as they do
+// the first of two.
+bool CameraSamples::leaves_out_last() const {
+    return sampler_.type == SamplerType::independent && wanted_.light_samples > 0 &&
+           wanted_.bsdf_samples == 0 && scene_.all_emitters_are_points;
 }
 
 void CameraSamples::choose_streams(const PixelGroup &group) {

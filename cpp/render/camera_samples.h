@@ -39,7 +39,8 @@ public:
     // Positions on the film: any value if they are not wanted.
     const float *film_x() const { return film_x_.data(); }
     const float *film_y() const { return film_y_.data(); }
-    // Numbers in [0, 1) of a sample of lights that is wanted; zeros if none is.
+    // Numbers in [0, 1) of a sample of lights that is wanted; zeros if none is. All of y
+    // may be zero where all lights are points.
     const float *light_x(uint32_t sample) const { return light_x_[sample].data(); }
     const float *light_y(uint32_t sample) const { return light_y_[sample].data(); }
     // Numbers in [0, 1) of a sample of materials that is wanted: two for the direction, and
@@ -58,6 +59,7 @@ private:
     void make_rays(const PixelGroup &group);
     void refract();
     void make_room_for_numbers(size_t padded);
+    bool leaves_out_last() const;
 
     const PreparedScene &scene_;
     const SampleStreams &streams_;

@@ -29,16 +29,17 @@ public:
     // Needs a positive sum of weights. `random` is in [0, 1).
     Choice choose(float random) const;
 
-    // The same for sixteen numbers at once, by comparing with all entries: for few of them.
+    // The same for sixteen numbers at once.
     struct Choices {
         UIntPacket index;
         FloatPacket reused, probability;
     };
     Choices choose(const FloatPacket &random) const;
 
-    size_t size() const { return weights_.size(); }
-
 private:
+    Choices choose_by_comparing_all(const FloatPacket &random) const;
+    Choices choose_by_bisection(const FloatPacket &random) const;
+
     std::vector<float> weights_;
     std::vector<float> cumulative_;
     uint32_t first_ = 0, last_ = 0; // the outermost entries with a positive weight

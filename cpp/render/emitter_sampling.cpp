@@ -1,6 +1,7 @@
 #include "render/emitter_sampling.h"
 
 #include "render/analytic_emitter.h"
+#include "render/point_light.h"
 #include "render/textured_light.h"
 
 #include <algorithm>
@@ -46,10 +47,9 @@ float choose_face(const EmitterTable &table, uint32_t first_face, float y, uint3
 }
 FloatPacket choose_face(const EmitterTable &table, uint32_t first_face,
                         const FloatPacket &y, FaceNumbers &faces) {
-    LaneArray<float> lanes = to_lanes<float>(y);
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-        lanes[lane] = choose_face(table, first_face, lanes[lane], faces[lane]);
-    return load<FloatPacket>(lanes);
+    const Distribution::Choices choices = table.face_areas.choose(y);
+    faces = to_lanes<uint32_t>(choices.index + UIntPacket(first_face));
+    return choices.reused;
 }
 
 // The same face in all lanes.
@@ -133,21 +133,22 @@ AnalyticLight<Real> sample_analytic(const PreparedScene &scene,
     return light;
 }
 
-// Mitsuba's spot.cpp, falloff_curve: linear in the angle between beam width and cut-off.
-FloatPacket spot_falloff(const Emitter &emitter, const EmitterTable &table,
-                         const FloatPacket &cosine) {
-    const FloatPacket zero(0.0f), one(1.0f);
-    const auto lit = cosine > FloatPacket(table.cos_cutoff);
-    const auto full = cosine >= FloatPacket(table.cos_beam);
-    if ((to_bits(lit) & ~to_bits(full)) == 0)
-        return select(lit, one, zero);
-    const FloatPacket falloff =
-        (FloatPacket(emitter.cutoff_angle) - arc_cosine(minimum(cosine, one))) *
-        FloatPacket(table.inverse_transition);
-    return select(full, one, select(lit, falloff, zero));
+PointLight<float> light_for(const PointLight<float> &light, float) {
+    return light;
 }
-float spot_falloff(const Emitter &emitter, const EmitterTable &table, float cosine) {
-    return first_lane(spot_falloff(emitter, table, FloatPacket(cosine)));
+PointLight<FloatPacket> light_for(const PointLight<float> &light, const FloatPacket &) {
+    return lights_in_all_lanes(light);
+}
+
+template <typename Real>
+EmitterSample<Real> from_point(const PointLight<Real> &light, const Real &choice_weight,
+                               const Vec3<Real> &p) {
+    const PointLightSample<Real> point = sample_point_light(light, p);
+    const Real factor = point.factor * choice_weight;
+    return {by_axis([&](int k) {
+                return select(point.has_light, factor * light.intensity[k], Real(0.0f));
+            }),
+            point.direction, light.position, all_of<Real>(NONE)};
 }
 
 // Mitsuba's constant.cpp and envmap.cpp, sample_direction.
@@ -189,20 +190,10 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
 
     switch (emitter.type) {
     case EmitterType::point:
-    case EmitterType::spot: {
-        sample.target = spread<Real>(emitter.position);
-        const Vec3<Real> to_light = sample.target - p;
-        const Real squared = dot(to_light, to_light);
-        has_light = squared > zero;
-        const Real inverse = one / square_root(squared);
-        sample.direction = inverse * to_light;
-        factor = inverse * inverse * choice_weight;
-        if (emitter.type == EmitterType::spot) {
-            const Real cosine = -dot(sample.direction, spread<Real>(emitter.direction));
-            factor = factor * spot_falloff(emitter, table, cosine);
-        }
-        break;
-    }
+    case EmitterType::spot:
+        if (density)
+            *density = Real(INFINITY);
+        return from_point(light_for(table.point, choice_weight), choice_weight, p);
     case EmitterType::directional: {
         // Mitsuba's directional.cpp.
         sample.target = p - way_out(scene, p) * spread<Real>(emitter.direction);
@@ -280,7 +271,6 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
 }
 
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
-    constexpr size_t FEW = 16; // compared with all; chosen
     const uint32_t count = uint32_t(scene.data.emitters.size());
     if (count == 1)
         return {UIntPacket(0u), FloatPacket(1.0f), x};
@@ -291,21 +281,8 @@ EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x)
             minimum(FloatPacket(UIntPacket(scaled)), FloatPacket(float(count - 1)));
         return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
     }
-    if (scene.emitter_choice.size() <= FEW) {
-        const Distribution::Choices choices = scene.emitter_choice.choose(x);
-        return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
-    }
-    const LaneArray<float> random = to_lanes<float>(x);
-    LaneArray<uint32_t> emitter;
-    LaneArray<float> weight, reused;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const OneChoice choice = choose_emitter(scene, random[lane]);
-        emitter[lane] = choice.emitter;
-        weight[lane] = choice.weight;
-        reused[lane] = choice.reused;
-    }
-    return {load<UIntPacket>(emitter), load<FloatPacket>(weight),
-            load<FloatPacket>(reused)};
+    const Distribution::Choices choices = scene.emitter_choice.choose(x);
+    return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
 }
 
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
@@ -313,6 +290,19 @@ EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t em
                                          const Vec3<FloatPacket> &p, const FloatPacket &y,
                                          FloatPacket *density) {
     return sample_one(scene, emitter, choices.weight, p, choices.x, y, density);
+}
+
+EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
+                                                const EmitterChoices &choices,
+                                                LaneBits lanes,
+                                                const Vec3<FloatPacket> &p) {
+    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
+    PointLight<FloatPacket> lights = lights_in_all_lanes(scene.emitter_tables[first].point);
+    const LaneBits others = lanes & ~to_bits(choices.emitter == UIntPacket(first));
+    for_each_value(choices.emitter, others, [&](uint32_t emitter, LaneBits holders) {
+        set_lanes(lights, holders, scene.emitter_tables[emitter].point);
+    });
+    return from_point(lights, choices.weight, p);
 }
 
 bool needs_light_numbers(const PreparedScene &scene) {

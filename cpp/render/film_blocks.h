@@ -4,6 +4,7 @@
 
 #include "render/compensated_sum.h"
 #include "render/filter.h"
+#include "render/pixel_group.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -32,18 +33,36 @@ public:
     void add(uint32_t column, uint32_t row, size_t first, size_t count, const float *x,
              const float *y, const float *const *values);
 
+    // The same for the samples of a group, which come pixel by pixel; arrays are those of
+    // whole packets.
+    void add(const PixelGroup &group, const float *x, const float *y,
+             const float *const *values);
+
     // Sum of weight * value of one pixel of the crop, for each channel, and of the weights.
     float pixel(uint32_t crop_column, uint32_t crop_row, float *sums) const;
 
+    // Of a row of the crop, if the channels are red, green and blue: the sums over those of
+    // the weights, side by side, pixel by pixel.
+    void develop_colours(uint32_t crop_row, float *colours) const;
+
 private:
+    int taps() const { return 2 * filter_.reach() + 1; } // along a row or column
     struct Footprint;
     Footprint footprint(float left, float top) const;
     void spread(float *corner, const Footprint &weights, const float *const *values,
                 size_t sample) const;
     void spread_compensated(float *corner, const Footprint &weights,
                             const float *const *values, size_t sample);
-    void spread_colour(float *corner, const Footprint &weights, const float *const *values,
-                       size_t sample) const;
+    float *corner_of(Pixel pixel);
+    struct PacketWeights;
+    void add_colours(const PixelGroup &group, size_t first, const float *x, const float *y,
+                     const float *const *values, PacketWeights &weights);
+    void spread_colours(float *corner, const PacketWeights &weights, uint32_t begin,
+                        uint32_t end) const;
+    struct BlockRange;
+    BlockRange blocks_near(int position, uint32_t blocks) const;
+    template <typename Visit>
+    void for_each_entry(int column, int row, BlockRange down, Visit &&visit) const;
     const float *at(uint32_t block, int column, int row) const;
 
     Film film_;

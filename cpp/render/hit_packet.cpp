@@ -4,16 +4,14 @@
 
 namespace mlrt {
 
-SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, const HitPacket &hit,
-                                     bool common_origin) {
+SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, FaceCache &cache,
+                                     const HitPacket &hit, bool common_origin) {
     const LaneBits on_objects = lanes_on_objects(scene, hit.faces, hit.lanes);
     const LaneBits on_meshes = hit.lanes & ~on_objects;
     SurfacePoint<FloatPacket> point{in_all_lanes({}), in_all_lanes({}), in_all_lanes({})};
     if (on_meshes != 0)
-        point = common_origin
-                    ? hit_surfaces(scene, scene.plane.origin, hit.direction, hit.faces,
-                                   on_meshes)
-                    : hit_surfaces(scene, hit.origin, hit.direction, hit.faces, on_meshes);
+        point = hit_surfaces(cache, common_origin ? nullptr : &hit.origin, hit.direction,
+                             hit.faces, on_meshes);
     if (on_objects != 0)
         place_object_surfaces(scene,
                               {hit.origin, hit.direction, hit.t, hit.faces, hit.instances},

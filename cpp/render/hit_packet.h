@@ -34,9 +34,9 @@ inline FloatPacket of_rays(const HitPacket &hit, const float *values) {
     return hit.first ? load<FloatPacket>(values + *hit.first) : gather(values, hit.ray);
 }
 
-// `common_origin`: the rays start where all of the camera's do.
-SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, const HitPacket &hit,
-                                     bool common_origin);
+// `common_origin`: the rays start where all of the cache's do.
+SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, FaceCache &cache,
+                                     const HitPacket &hit, bool common_origin);
 
 // The same for robust shadow rays.
 SurfacePlane<DoublePacket> plane_of(const PreparedScene &scene, const HitPacket &hit);

@@ -1,7 +1,11 @@
 #include "render/picture_film.h"
 
 #include "base/morton.h"
+#include "base/pixel_block.h"
+#include "base/streamed.h"
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 namespace mlrt {
@@ -14,8 +18,6 @@ PictureFilm::PictureFilm(const Film &film, uint32_t samples_per_pixel, FilmTarge
         blocks_.emplace(film, channel_count(), samples_per_pixel);
     else if (samples_per_pixel > MOST_PLAIN_SUMMANDS)
         errors_.resize(size_t(channel_count()) * sampled_.width * sampled_.height);
-    for (uint32_t column = 0; column < column_codes_.size(); ++column)
-        column_codes_[column] = morton_code(column, 0);
 }
 
 void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
@@ -27,31 +29,44 @@ void PictureFilm::add(const PixelGroup &group, const float *x, const float *y,
             add_whole_pixels(group, values);
         return;
     }
-    for (size_t i = 0; i < group.offsets.size(); ++i) {
-        const Pixel pixel = group.pixel(i);
-        blocks_->add(pixel.column, pixel.row, i * group.sample_count, group.sample_count, x,
-                     y, values);
-    }
+    blocks_->add(group, x, y, values);
 }
 
-// With a box filter the sampled rectangle is the crop. Squares are written row by row:
-// rows may lie so far apart that a cache keeps only a few of them at once.
+// A packet of a square's rays is a block of four by four pixels. Rows of blocks are put
+// together before they are written: rows of a picture may lie so far apart that a cache
+// keeps only a few of them at once.
+void PictureFilm::write_square(const PixelGroup &group, const float *const *values) {
+    constexpr uint32_t STRIP = 64; // pixels along a row that are put together; chosen
+    std::array<std::array<float, COLOURS * STRIP>, PIXEL_BLOCK> rows;
+    const uint32_t width = std::min(STRIP, group.side);
+    for (uint32_t top = 0; top < group.side; top += PIXEL_BLOCK)
+        for (uint32_t left = 0; left < group.side; left += width) {
+            for (uint32_t column = 0; column < width; column += PIXEL_BLOCK) {
+                const uint32_t ray = morton_code(left + column, top);
+                store_pixel_block(rows[0].data() + COLOURS * column, rows[0].size(),
+                                  load<FloatPacket>(values[0] + ray),
+                                  load<FloatPacket>(values[1] + ray),
+                                  load<FloatPacket>(values[2] + ray));
+            }
+            for (uint32_t row = 0; row < PIXEL_BLOCK; ++row) {
+                const Pixel first{group.left + left, group.top + top + row};
+                stream(target_.image + COLOURS * number_of(first), rows[row].data(),
+                       COLOURS * width);
+            }
+        }
+    finish_streaming();
+}
+
+// With a box filter the sampled rectangle is the crop.
 void PictureFilm::write_pixels(const PixelGroup &group, const float *const *values) {
-    const float *red = values[0], *green = values[1], *blue = values[2];
-    const auto write = [&](float *out, size_t ray) {
-        out[0] = red[ray];
-        out[1] = green[ray];
-        out[2] = blue[ray];
-    };
-    for (uint32_t row = 0; row < group.side; ++row) {
-        float *out = target_.image + COLOURS * number_of({group.left, group.top + row});
-        const uint32_t of_row = morton_code(0, row);
-        for (uint32_t column = 0; column < group.side; ++column, out += COLOURS)
-            write(out, of_row | column_codes_[column]);
+    const bool in_blocks = group.side >= PIXEL_BLOCK;
+    if (in_blocks)
+        write_square(group, values);
+    for (size_t i = 0; !in_blocks && i < group.offsets.size(); ++i) {
+        float *out = target_.image + COLOURS * number_of(group.pixel(i));
+        for (uint32_t k = 0; k < COLOURS; ++k)
+            out[k] = values[k][i];
     }
-    if (group.side == 0)
-        for (size_t i = 0; i < group.offsets.size(); ++i)
-            write(target_.image + COLOURS * number_of(group.pixel(i)), i);
     for (uint32_t k = COLOURS; k < channel_count(); ++k)
         for (size_t i = 0; i < group.offsets.size(); ++i)
             channel(k, number_of(group.pixel(i))) = values[k][i];
@@ -83,6 +98,11 @@ void PictureFilm::add_whole_pixels(const PixelGroup &group, const float *const *
 
 // Divides the sums by their weights (Mitsuba's hdrfilm.cpp, develop).
 void PictureFilm::finish_row(uint32_t row) {
+    if (channel_count() == COLOURS) {
+        blocks_->develop_colours(row,
+                                 target_.image + COLOURS * size_t(row) * film_.crop_width);
+        return;
+    }
     std::vector<float> sums(channel_count());
     for (uint32_t column = 0; column < film_.crop_width; ++column) {
         const float weight = blocks_->pixel(column, row, sums.data());

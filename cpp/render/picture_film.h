@@ -4,7 +4,6 @@
 #include "render/film_blocks.h"
 #include "render/pixel_group.h"
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -69,6 +68,7 @@ private:
         return other.data[other.stride * pixel];
     }
     void write_pixels(const PixelGroup &group, const float *const *values);
+    void write_square(const PixelGroup &group, const float *const *values);
     void add_whole_pixels(const PixelGroup &group, const float *const *values);
 
     Film film_;
@@ -77,7 +77,6 @@ private:
     PixelRect sampled_;
     std::optional<FilmBlocks> blocks_; // unless the filter is a box
     std::vector<float> errors_; // of the sums of a box: pixel, channel; if compensated
-    std::array<uint32_t, PixelGroup::MAX_SIDE> column_codes_; // Morton codes in row 0
 };
 
 } // namespace mlrt

@@ -84,19 +84,29 @@ Box3f bounds_of(const SceneData &scene) {
     return bounds;
 }
 
+PointLight<float> point_light(const Emitter &emitter) {
+    constexpr float EVERYWHERE = -std::numeric_limits<float>::infinity();
+    if (emitter.type == EmitterType::point)
+        return {emitter.position, emitter.radiance, {}, EVERYWHERE, EVERYWHERE, 0, 0};
+    return {emitter.position,
+            emitter.radiance,
+            emitter.direction,
+            float(std::cos(double(emitter.cutoff_angle))),
+            float(std::cos(double(emitter.beam_width))),
+            emitter.cutoff_angle,
+            1.0f / (emitter.cutoff_angle - emitter.beam_width)};
+}
+
 EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitter) {
     const SceneData &scene = prepared.data;
     EmitterTable table;
-    if (emitter.type == EmitterType::spot) {
-        table.cos_cutoff = float(std::cos(double(emitter.cutoff_angle)));
-        table.cos_beam = float(std::cos(double(emitter.beam_width)));
-        table.inverse_transition = 1.0f / (emitter.cutoff_angle - emitter.beam_width);
-    }
-    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
+    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point) {
+        table.point = point_light(emitter);
         // Rays from a light would also be rounded in the frames of instances, at both ends.
         table.shadow_rays_from_light = !prepared.bounds.empty() &&
                                        is_near(prepared.bounds, emitter.position) &&
                                        (!scene.objects || scene.objects->instances.empty());
+    }
     if (emitter.type != EmitterType::area)
         return table;
 
@@ -135,7 +145,7 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
 
 PreparedScene::PreparedScene(SceneData scene_data)
     : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
-      environment(data), bounds(bounds_of(data)) {
+      environment(data), glowing(glowing_faces(data)), bounds(bounds_of(data)) {
     shape_of_face.resize(data.objects ? data.objects->face_end()
                                       : data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
@@ -151,6 +161,8 @@ PreparedScene::PreparedScene(SceneData scene_data)
     for (const Emitter &emitter : data.emitters) {
         emitter_tables.push_back(prepare_emitter(*this, emitter));
         weights.push_back(emitter.sampling_weight);
+        all_emitters_are_points &=
+            emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
     }
     if (std::any_of(weights.begin(), weights.end(), [](float w) { return w != 1.0f; }))
         emitter_choice = Distribution(weights);

@@ -4,25 +4,26 @@
 #include "render/camera.h"
 #include "render/distribution.h"
 #include "render/environment.h"
+#include "render/glowing_faces.h"
+#include "render/point_light.h"
 #include "render/scene.h"
 #include "render/texture_sampler.h"
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace mlrt {
 
 // What sampling an emitter needs beyond its description.
 struct EmitterTable {
-    Distribution face_areas;      // area, on a mesh but a rectangle: of its faces
-    Vec3f normal{};               // rectangle, disk: unit, on the side that glows
-    float inverse_area = 0;       // area: 1 / area
-    TextureSampler texture;       // area, with a texture: of its points
-    float edge_scale = 1;         // area: a power of two, 1 unless the area is tiny
-    float cos_cutoff = 0;         // spot
-    float cos_beam = 0;           // spot
-    float inverse_transition = 0; // spot: 1 / (cutoff_angle - beam_width)
-    float unevenness = 0; // rectangle: how far it lies off the plane of its first face
+    Distribution face_areas;   // area, on a mesh but a rectangle: of its faces
+    Vec3f normal{};            // rectangle, disk: unit, on the side that glows
+    float inverse_area = 0;    // area: 1 / area
+    TextureSampler texture;    // area, with a texture: of its points
+    float edge_scale = 1;      // area: a power of two, 1 unless the area is tiny
+    PointLight<float> point{}; // point, spot
+    float unevenness = 0;      // rectangle: how far it lies off the plane of its first face
     bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
 
@@ -33,9 +34,11 @@ struct PreparedScene {
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
     bool any_material_is_textured = false;
+    bool all_emitters_are_points = true;      // or spots
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
+    std::optional<GlowingFaces> glowing;
     Box3f bounds;   // of all that rays can hit
     Vec3f center{}; // of a sphere around the bounds
     float radius = 0;

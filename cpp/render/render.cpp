@@ -35,15 +35,14 @@ FilmTarget film_target(RenderResult &result) {
     return target;
 }
 
-// Rays without a common origin, if every sample hits something.
+// Rays without a common origin that go through the scene, if every sample hits something.
 double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
                   double samples) {
-    const auto is_lamp = [](const Emitter &emitter) {
-        return emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
-    };
-    const bool all_lamps = std::ranges::all_of(scene.data.emitters, is_lamp);
-    return samples * ((all_lamps ? 0 : settings.sampling.emitter_samples) +
-                      settings.sampling.bsdf_samples);
+    const double of_emitters =
+        scene.all_emitters_are_points ? 0 : settings.sampling.emitter_samples;
+    const double of_bsdfs =
+        looks_for_light_first(scene) ? 0 : settings.sampling.bsdf_samples;
+    return samples * (of_emitters + of_bsdfs);
 }
 
 } // namespace

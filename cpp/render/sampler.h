@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -39,6 +40,13 @@ public:
         state_ = old * 0x5851f42d4c957f2dull + increment_;
         return std::rotr(uint32_t(((old >> 18) ^ old) >> 27), int(old >> 59));
     }
+
+    // All there is to it, to go on later.
+    struct State {
+        uint64_t state, increment;
+    };
+    State state() const { return {state_, increment_}; }
+    explicit Pcg32(State state) : state_(state.state), increment_(state.increment) {}
 
     // Uniform in [0, 1): 23 random bits as the mantissa of a number in [1, 2).
     float next_float() {
@@ -117,8 +125,8 @@ struct NumberPair {
     float *x = nullptr, *y = nullptr;
 };
 
-// The numbers of samples, pair by pair. The loops for one and for two pairs have no
-// branches, so compilers make vector code of them.
+// The numbers of samples, pair by pair. Loops over samples have no branches, so compilers
+// make vector code of them; those for one and for two pairs keep generators in registers.
 inline void draw_numbers(const uint32_t *__restrict seeds,
                          const uint32_t *__restrict indices, size_t count,
                          std::span<const NumberPair> pairs) {
@@ -134,6 +142,17 @@ inline void draw_numbers(const uint32_t *__restrict seeds,
         }
         return;
     }
+    if (pairs.size() == 2 && !pairs[1].y && pairs[1].x) {
+        float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
+        float *__restrict x1 = pairs[1].x;
+        for (size_t i = 0; i < count; ++i) {
+            Pcg32 random = open(i);
+            x0[i] = random.next_float();
+            y0[i] = random.next_float();
+            x1[i] = random.next_float();
+        }
+        return;
+    }
     if (pairs.size() == 2 && pairs[1].y) {
         float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
         float *__restrict x1 = pairs[1].x, *__restrict y1 = pairs[1].y;
@@ -146,14 +165,27 @@ inline void draw_numbers(const uint32_t *__restrict seeds,
         }
         return;
     }
-    for (size_t i = 0; i < count; ++i) {
-        Pcg32 random = open(i);
+    constexpr size_t BLOCK = 256; // generators that are kept at a time; chosen
+    std::array<uint64_t, BLOCK> states, increments;
+    for (size_t begin = 0; begin < count; begin += BLOCK) {
+        const size_t size = std::min(BLOCK, count - begin);
+        for (size_t i = 0; i < size; ++i) {
+            const Pcg32::State opened = open(begin + i).state();
+            states[i] = opened.state;
+            increments[i] = opened.increment;
+        }
+        const auto draw = [&](float *__restrict numbers) {
+            for (size_t i = 0; i < size; ++i) {
+                Pcg32 random(Pcg32::State{states[i], increments[i]});
+                numbers[i] = random.next_float();
+                states[i] = random.state().state;
+            }
+        };
+        std::array<float, BLOCK> dropped;
         for (const NumberPair &pair : pairs) {
-            const float first = random.next_float();
-            if (pair.x)
-                pair.x[i] = first;
+            draw(pair.x ? pair.x + begin : dropped.data());
             if (pair.y)
-                pair.y[i] = random.next_float();
+                draw(pair.y + begin);
         }
     }
 }

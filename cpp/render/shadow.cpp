@@ -1,5 +1,6 @@
 #include "render/shadow.h"
 
+#include "base/lane_bits.h"
 #include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
 
@@ -37,18 +38,23 @@ void ShadowRays::reserve(size_t size) {
     for (int k = 0; k < 3; ++k) {
         origin_[k].resize(from_light_ ? 0 : size);
         direction_[k].resize(size);
-        light_[k].resize(size);
     }
     t_min_.resize(size, begin_);
     t_max_.resize(size, end_);
     occluded_.resize(size);
 }
 
-void ShadowRays::append(LaneBits lanes, const UIntPacket &ray,
-                        const Vec3<FloatPacket> &from, const Vec3<FloatPacket> &to,
-                        const Vec3<FloatPacket> &light) {
+void ShadowRays::append(LaneBits lanes, const HitPacket &hit, const Vec3<FloatPacket> &from,
+                        const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light) {
     reserve(count_ + PACKET_WIDTH);
-    store_compressed(&ray_[count_], ray, lanes);
+    if (packet_count_ == packets_.size())
+        packets_.resize(std::max<size_t>(PACKET_WIDTH, 2 * packets_.size()));
+    Packet &packet = packets_[packet_count_++];
+    for (int k = 0; k < 3; ++k)
+        packet.light[k] = light[k];
+    packet.first = hit.first;
+    packet.lanes = lanes;
+    store_compressed(&ray_[count_], hit.ray, lanes);
     for (int k = 0; k < 3; ++k) {
         if (!from_light_)
             store_compressed(&origin_[k][count_], from[k], lanes);
@@ -56,7 +62,6 @@ void ShadowRays::append(LaneBits lanes, const UIntPacket &ray,
                                 : from_light_ ? from[k] - to[k]
                                               : to[k] - from[k];
         store_compressed(&direction_[k][count_], way, lanes);
-        store_compressed(&light_[k][count_], light[k], lanes);
     }
     count_ += uint32_t(std::popcount(lanes));
 }
@@ -85,6 +90,42 @@ void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &optio
         trace_any_objects(*scene.objects, rays, occluded_.data(), counters);
     for (uint32_t i = 0; cost && i < count_; ++i)
         cost[ray_[i]] += cost_[i];
+}
+
+void ShadowRays::trace(const SceneData &scene, const TraceOptions &options,
+                       Counters &counters, float *cost,
+                       std::span<float *const, 3> colours) {
+    if (count_ == 0)
+        return;
+    find_occluded(scene, options, counters, cost);
+    const uint8_t *occluded = occluded_.data();
+    const uint32_t *ray = ray_.data();
+    for (const Packet &packet : std::span(packets_).first(packet_count_)) {
+        const LaneBits visible = spread_to(packet.lanes, zero_bytes(occluded));
+        add_light(packet, visible, ray, colours);
+        const int count = std::popcount(packet.lanes);
+        occluded += count;
+        ray += count;
+    }
+}
+
+// `rays` are the camera rays of the lanes that have light, one after the other.
+void ShadowRays::add_light(const Packet &packet, LaneBits visible, const uint32_t *rays,
+                           std::span<float *const, 3> colours) {
+    if (packet.first) {
+        const auto mask = from_bits<FloatPacket>(visible);
+        for (int k = 0; k < 3; ++k) {
+            float *colour = colours[size_t(k)] + *packet.first;
+            const FloatPacket before = load<FloatPacket>(colour);
+            store(colour, select(mask, before + packet.light[k], before));
+        }
+        return;
+    }
+    for_each_lane(packet.lanes, [&](uint32_t lane) {
+        for (int k = 0; k < 3 && ((visible >> lane) & 1u); ++k)
+            colours[size_t(k)][*rays] += packet.light[k].entry(lane);
+        ++rays;
+    });
 }
 
 } // namespace mlrt

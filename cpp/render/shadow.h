@@ -4,11 +4,13 @@
 #include "base/counters.h"
 #include "base/simd.h"
 #include "mlrta/trace.h"
+#include "render/hit_packet.h"
 #include "render/prepared_scene.h"
 #include "render/shadow_offset.h"
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace mlrt {
@@ -23,31 +25,27 @@ class ShadowRays {
 public:
     ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset);
 
-    void clear() { count_ = 0; }
+    void clear() { count_ = packet_count_ = 0; }
 
     // Adds the lanes whose bit is set: `light` reaches the point `from`, which lies off its
-    // surface (see shadow_offset.h), from the point `to`. `ray` is the camera ray that it
-    // is for.
-    void append(LaneBits lanes, const UIntPacket &ray, const Vec3<FloatPacket> &from,
+    // surface (see shadow_offset.h), from the point `to`. The hits tell which camera rays
+    // it is for.
+    void append(LaneBits lanes, const HitPacket &hit, const Vec3<FloatPacket> &from,
                 const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light);
 
-    // Calls visible(ray, light) for all that nothing occludes, in the order given. What
-    // tracing takes is added to cost[ray] if `cost` is given.
-    template <typename Visible>
+    // Adds the light that nothing occludes to colours[k][ray], in the order given, and what
+    // tracing takes to cost[ray] if `cost` is given.
     void trace(const SceneData &scene, const TraceOptions &options, Counters &counters,
-               float *cost, Visible &&visible) {
-        if (count_ == 0)
-            return;
-        find_occluded(scene, options, counters, cost);
-        for (uint32_t i = 0; i < count_; ++i)
-            if (!occluded_[i])
-                visible(ray_[i], Vec3f{light_[0][i], light_[1][i], light_[2][i]});
-    }
+               float *cost, std::span<float *const, 3> colours);
 
 private:
     void reserve(size_t size);
     void find_occluded(const SceneData &scene, const TraceOptions &options,
                        Counters &counters, float *cost);
+
+    struct Packet;
+    static void add_light(const Packet &packet, LaneBits visible, const uint32_t *rays,
+                          std::span<float *const, 3> colours);
 
     bool from_light_;
     Vec3f light_position_;
@@ -58,9 +56,16 @@ private:
     std::vector<uint32_t> ray_;
     std::vector<float> origin_[3]; // if the rays do not start at the light
     std::vector<float> direction_[3];
-    std::vector<float> light_[3];
     std::vector<float> t_min_, t_max_, cost_;
     std::vector<uint8_t> occluded_;
+    // What was added at once: the lanes have light, and neighbouring entries above.
+    struct Packet {
+        Vec3<FloatPacket> light;     // any value in other lanes
+        std::optional<size_t> first; // camera ray in lane 0, if the others follow it
+        LaneBits lanes;
+    };
+    uint32_t packet_count_ = 0;
+    std::vector<Packet> packets_; // and more, to be overwritten
 };
 
 } // namespace mlrt

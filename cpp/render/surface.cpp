@@ -1,5 +1,7 @@
 #include "render/surface.h"
 
+#include "render/face_cache.h"
+
 namespace mlrt {
 
 namespace {
@@ -26,99 +28,111 @@ const Shape &shape_of(const PreparedScene &scene, uint32_t face) {
     return scene.data.shapes[scene.shape_of_face[face]];
 }
 
-// 1, or -1 where the normals of the shape are turned.
-float facing(const Shape &shape) {
-    return shape.flip_normals ? -1.0f : 1.0f;
-}
-
-template <typename Real, typename Corner>
-Vec3<Real> interpolate(const Corners<Corner> &v, const Real &wa, const Real &wb,
+// A Part is a number of one face, float, or of a face a lane, Real.
+template <typename Real, typename Part>
+Vec3<Real> interpolate(const Corners<Part> &v, const Real &wa, const Real &wb,
                        const Real &wc) {
     return by_axis([&](int k) {
         return fused(Real(v.a[k]), wa, fused(Real(v.b[k]), wb, Real(v.c[k]) * wc));
     });
 }
 
-// In double precision, where the product of tiny edges does not vanish.
-template <typename Real>
-Vec3<Real> face_normal_of(const Corners<Real> &corners) {
-    const auto a = to_double(corners.a);
-    const auto normal =
-        normalize(cross(to_double(corners.b) - a, to_double(corners.c) - a));
-    return {Real(normal.x), Real(normal.y), Real(normal.z)};
+template <typename Real, typename Part>
+Real fused_dot(const Vec3<Real> &a, const Vec3<Part> &b) {
+    return fused(a.x, Real(b.x), fused(a.y, Real(b.y), a.z * Real(b.z)));
 }
 
-// Of faces without normals of their vertices, and not turned (Mitsuba 3.9's mesh.cpp,
-// compute_surface_interaction). Corner is float if all rays meet the same face.
-template <typename Real, typename Corner>
-SurfacePoint<Real> on_face(const Vec2<Real> &at, const Corners<Corner> &corners) {
-    const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
-    const auto normal = Vec3<Real>(face_normal_of(corners));
-    return {interpolate<Real>(corners, w0, w1, w2), normal, normal};
+// As a ray has them that is known to hit; where they are no numbers, some point of the
+// face.
+template <typename Real, typename Part>
+Vec2<Real> weights_of(const Vec3<Real> &direction, const WeightForm<Part> &form) {
+    using Double = DoubleOf<Real>;
+    const auto d = to_double(direction);
+    const Double scale = Double(1.0) / fused_dot(d, form.normal);
+    const Real zero(0.0f), one(1.0f);
+    const Real b = maximum(Real(fused_dot(d, form.b) * scale), zero);
+    const Real c = maximum(Real(fused_dot(d, form.c) * scale), zero);
+    const Real weight_b = minimum(b, one);
+    return {weight_b, minimum(c, one - weight_b)};
 }
 
-template <typename Real, typename Corner>
-Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Corner> &n,
-                               const Vec3<Real> &face_normal) {
+template <typename Real, typename Part>
+Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Part> &n,
+                               const Vec3<Part> &face_normal) {
     const Real w1 = at.x, w2 = at.y, w0 = Real(1.0f) - w1 - w2;
-    const Vec3<Real> mean = interpolate<Real>(Corners<Corner>{n.c, n.b, n.a}, w2, w1, w0);
+    const Vec3<Real> mean = interpolate<Real>(Corners<Part>{n.c, n.b, n.a}, w2, w1, w0);
     // Opposite vertex normals can cancel; the face normal is then as good as any.
     const MaskOf<Real> has_direction = dot(mean, mean) > Real(0.0f);
     const Vec3<Real> unit = normalize(mean);
-    return by_axis([&](int k) { return select(has_direction, unit[k], face_normal[k]); });
+    return by_axis(
+        [&](int k) { return select(has_direction, unit[k], Real(face_normal[k])); });
+}
+
+// Mitsuba 3.9's mesh.cpp, compute_surface_interaction. Normals of vertices are zeros where
+// the face normal serves; there need be none if it does everywhere.
+template <typename Real, typename Part>
+SurfacePoint<Real> point_on(const Vec3<Real> &direction, const FaceParts<Part> &face,
+                            const Corners<Part> *normals) {
+    const Vec2<Real> at = weights_of(direction, face.weights);
+    const Vec3<Real> normal(face.normal);
+    return {interpolate(face.corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
+            normals ? interpolated_normal(at, *normals, face.normal) : normal};
 }
 
 template <typename Real>
-void turn(SurfacePoint<Real> &point, const Real &sign) {
-    point.face_normal = sign * point.face_normal;
-    point.shading_normal = sign * point.shading_normal;
+SurfacePoint<Real> point_on(const Vec3<Real> &direction, const HitFace &face) {
+    return point_on(direction, face.parts, face.vertex_normals ? &face.normals : nullptr);
 }
 
-template <typename Real, typename Origin>
-SurfacePoint<Real> on_one_face(const PreparedScene &scene, const Vec3<Origin> &origin,
-                               const Vec3<Real> &direction, uint32_t face) {
-    const Shape &shape = shape_of(scene, face);
-    const Corners<float> corners = corners_of(scene, face);
-    const Vec2<Real> at = barycentrics_of(origin, direction, corners);
-    SurfacePoint<Real> point = on_face(at, corners);
-    if (shape.vertex_normals)
-        point.shading_normal =
-            interpolated_normal(at, normals_of(scene, face), point.face_normal);
-    turn(point, Real(facing(shape)));
-    return point;
-}
-
-template <typename Origin>
-SurfacePoint<FloatPacket> on_faces(const PreparedScene &scene, const Vec3<Origin> &origin,
-                                   const Vec3<FloatPacket> &direction,
-                                   const FaceNumbers &faces) {
-    const Corners<FloatPacket> corners = corners_of(scene, faces);
-    const Vec2<FloatPacket> at = barycentrics_of(origin, direction, corners);
-    SurfacePoint<FloatPacket> point = on_face(at, corners);
-    LaneArray<float> signs;
-    LaneBits interpolated = 0;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const Shape &shape = shape_of(scene, faces[lane]);
-        signs[lane] = facing(shape);
-        interpolated |= LaneBits(shape.vertex_normals) << lane;
-    }
-    if (interpolated != 0)
-        point.shading_normal =
-            interpolated_normal(at, normals_of(scene, faces), point.face_normal);
-    turn(point, load<FloatPacket>(signs));
-    return point;
-}
-
-void replace(SurfacePoint<FloatPacket> &point, LaneBits lanes,
-             const SurfacePoint<FloatPacket> &by) {
+// Sets the given lanes.
+void place(Vec3<FloatPacket> &vectors, LaneBits lanes, Vec3f vector) {
     const auto mask = from_bits<FloatPacket>(lanes);
-    for (int k = 0; k < 3; ++k) {
-        point.p[k] = select(mask, by.p[k], point.p[k]);
-        point.face_normal[k] = select(mask, by.face_normal[k], point.face_normal[k]);
-        point.shading_normal[k] =
-            select(mask, by.shading_normal[k], point.shading_normal[k]);
-    }
+    for (int k = 0; k < 3; ++k)
+        vectors[k] = select(mask, FloatPacket(vector[k]), vectors[k]);
 }
+void place(Vec3<DoublePacket> &vectors, LaneBits lanes, Vec3d vector) {
+    const auto mask = from_bits<DoublePacket>(lanes);
+    for (int k = 0; k < 3; ++k)
+        vectors[k] = select(mask, DoublePacket(vector[k]), vectors[k]);
+}
+void place(Corners<FloatPacket> &corners, LaneBits lanes, const Corners<float> &values) {
+    place(corners.a, lanes, values.a);
+    place(corners.b, lanes, values.b);
+    place(corners.c, lanes, values.c);
+}
+
+Corners<FloatPacket> corners_in_all_lanes(const Corners<float> &corners) {
+    return {in_all_lanes(corners.a), in_all_lanes(corners.b), in_all_lanes(corners.c)};
+}
+
+// The faces of sixteen rays.
+struct FaceLanes {
+    FaceParts<FloatPacket> parts;
+    Corners<FloatPacket> normals;
+    bool vertex_normals; // whether any has them
+
+    // All lanes take the first face.
+    explicit FaceLanes(const HitFace &face)
+        : parts{corners_in_all_lanes(face.parts.corners),
+                in_all_lanes(face.parts.normal),
+                {Vec3<DoublePacket>(face.parts.weights.normal),
+                 Vec3<DoublePacket>(face.parts.weights.b),
+                 Vec3<DoublePacket>(face.parts.weights.c)}},
+          normals(corners_in_all_lanes(face.normals)), vertex_normals(face.vertex_normals) {
+    }
+
+    void set(LaneBits lanes, const HitFace &face) {
+        place(parts.corners, lanes, face.parts.corners);
+        place(parts.normal, lanes, face.parts.normal);
+        place(parts.weights.normal, lanes, face.parts.weights.normal);
+        place(parts.weights.b, lanes, face.parts.weights.b);
+        place(parts.weights.c, lanes, face.parts.weights.c);
+        if (!vertex_normals && !face.vertex_normals)
+            return;
+        vertex_normals = true;
+        place(normals, lanes, face.normals);
+    }
+};
 
 } // namespace
 
@@ -153,48 +167,41 @@ FaceNumbers faces_in(const UIntPacket &faces, LaneBits lanes) {
 SurfacePoint<float> triangle_surface(Vec3f origin, Vec3f direction,
                                      const Corners<float> &corners,
                                      const Corners<float> *normals) {
-    const Vec2f at = barycentrics_of(origin, direction, corners);
-    SurfacePoint<float> point = on_face(at, corners);
-    if (normals)
-        point.shading_normal = interpolated_normal(at, *normals, point.face_normal);
-    return point;
+    return point_on(direction, hit_face(origin, corners, normals, false));
 }
 
 SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
                                 uint32_t face) {
-    return on_one_face(scene, origin, direction, face);
+    return point_on(direction, hit_face(scene, origin, face));
 }
 
-template <typename Origin>
-SurfacePoint<FloatPacket>
-hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
-             const Vec3<FloatPacket> &direction, const UIntPacket &faces, LaneBits lanes) {
-    // Neighbours mostly meet the same few faces, which are then read once, and whose part
-    // of the work is done once if the origin is the same too.
-    constexpr uint32_t FEW = 4; // chosen
-    const auto first_of = [&](LaneBits left) {
-        return lane_of(faces, uint32_t(__builtin_ctz(left)));
-    };
-    uint32_t face = first_of(lanes);
-    SurfacePoint<FloatPacket> point = on_one_face(scene, origin, direction, face);
-    LaneBits left = lanes & ~to_bits(faces == UIntPacket(face));
-    for (uint32_t n = 1; n < FEW && left != 0; ++n) {
-        face = first_of(left);
-        const LaneBits served = left & to_bits(faces == UIntPacket(face));
-        replace(point, served, on_one_face(scene, origin, direction, face));
-        left &= ~served;
+SurfacePoint<FloatPacket> hit_surfaces(FaceCache &cache, const Vec3<FloatPacket> *origin,
+                                       const Vec3<FloatPacket> &direction,
+                                       const UIntPacket &faces, LaneBits lanes) {
+    const uint32_t first = lane_of(faces, uint32_t(__builtin_ctz(lanes)));
+    const LaneBits others = lanes & ~to_bits(faces == UIntPacket(first));
+    if (others == 0 && !origin)
+        return point_on(direction, cache.of(first));
+    FaceLanes met(cache.of(first));
+    Vec3<DoublePacket> edge_b, edge_c;
+    if (origin) {
+        edge_b = Vec3<DoublePacket>(cache.of(first).edge_b);
+        edge_c = Vec3<DoublePacket>(cache.of(first).edge_c);
     }
-    if (left != 0)
-        replace(point, left, on_faces(scene, origin, direction, faces_in(faces, left)));
-    return point;
+    for_each_value(faces, others, [&](uint32_t number, LaneBits holders) {
+        const HitFace &face = cache.of(number);
+        met.set(holders, face);
+        if (origin) {
+            place(edge_b, holders, face.edge_b);
+            place(edge_c, holders, face.edge_c);
+        }
+    });
+    if (origin) {
+        const Vec3<DoublePacket> way = to_double(*origin) - to_double(met.parts.corners.a);
+        met.parts.weights.b = cross(way, edge_c);
+        met.parts.weights.c = cross(edge_b, way);
+    }
+    return point_on(direction, met.parts, met.vertex_normals ? &met.normals : nullptr);
 }
-
-template SurfacePoint<FloatPacket> hit_surfaces(const PreparedScene &, const Vec3f &,
-                                                const Vec3<FloatPacket> &,
-                                                const UIntPacket &, LaneBits);
-template SurfacePoint<FloatPacket> hit_surfaces(const PreparedScene &,
-                                                const Vec3<FloatPacket> &,
-                                                const Vec3<FloatPacket> &,
-                                                const UIntPacket &, LaneBits);
 
 } // namespace mlrt

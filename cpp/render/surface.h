@@ -11,6 +11,8 @@
 
 namespace mlrt {
 
+class FaceCache;
+
 // The faces of a packet.
 using FaceNumbers = LaneArray<uint32_t>;
 
@@ -32,12 +34,11 @@ struct SurfacePoint {
 SurfacePoint<float> hit_surface(const PreparedScene &scene, Vec3f origin, Vec3f direction,
                                 uint32_t face);
 
-// The same for the given lanes of sixteen rays with one origin (Origin is float) or an
-// origin each (FloatPacket); the other lanes get any values.
-template <typename Origin>
-SurfacePoint<FloatPacket>
-hit_surfaces(const PreparedScene &scene, const Vec3<Origin> &origin,
-             const Vec3<FloatPacket> &direction, const UIntPacket &faces, LaneBits lanes);
+// The same for the given lanes of sixteen rays, which start at `origin`, or, without, at
+// that of the cache; the other lanes get any values.
+SurfacePoint<FloatPacket> hit_surfaces(FaceCache &cache, const Vec3<FloatPacket> *origin,
+                                       const Vec3<FloatPacket> &direction,
+                                       const UIntPacket &faces, LaneBits lanes);
 
 // A triangle that a ray is known to hit. `normals` are those of its vertices; without, the
 // face normal serves.

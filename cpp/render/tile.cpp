@@ -8,9 +8,7 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <numbers>
-#include <utility>
 
 namespace mlrt {
 
@@ -52,6 +50,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
       emitter_samples_(needs_light_numbers(scene) ? sampling.emitter_samples
                                                   : std::min(1u, sampling.emitter_samples)),
       options_(options), offset_(offset), target_(target),
+      faces_(scene, scene.plane.origin),
       samples_(scene, streams, sampling.sampler, target.film.sampled(),
                {target.film.needs_positions(),
                 needs_light_numbers(scene) ? sampling.emitter_samples : 0,
@@ -177,7 +176,8 @@ void TileRenderer::shade_hits() {
             hit.t = load<FloatPacket>(&t_[first]);
             hit.instances = load<UIntPacket>(&instance_[first]);
         }
-        const SurfacePoint<FloatPacket> point = surface_of(scene_, hit, common_origin);
+        const SurfacePoint<FloatPacket> point =
+            surface_of(scene_, faces_, hit, common_origin);
         write_depth_and_normal(hit, point, first);
         shade(hit, point);
     }
@@ -232,23 +232,30 @@ void TileRenderer::add_emitter_sample(const HitPacket &hit,
                                       const SurfacePoint<FloatPacket> &point,
                                       LaneBits lanes, const FloatPacket &cos_view,
                                       const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const FloatPacket zero(0.0f), x = of_rays(hit, samples_.light_x(sample));
+    const FloatPacket x = of_rays(hit, samples_.light_x(sample));
     const FloatPacket y = of_rays(hit, samples_.light_y(sample));
     const EmitterChoices choices = choose_emitters(scene_, x);
-    for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits lit) {
-        const EmitterSample<FloatPacket> light =
-            sample_chosen(scene_, emitter, choices, point.p, y);
-        const FloatPacket cosine = dot(light.direction, point.shading_normal);
-        const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
-        lit &= not_black(light.weight) & to_bits(cos_light > zero);
-        if (lit == 0)
-            return;
-        const ShadowSegment<FloatPacket> segment =
-            shadow_segment(scene_, offset_, hit, point, emitter, light);
-        const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-        shadows_[emitter].append(lit, hit.ray, segment.start, segment.target,
-                                 (albedo * share) * light.weight);
-    });
+    for_each_light(
+        scene_, choices, lanes, point.p, y,
+        [&](uint32_t emitter, LaneBits lit, const EmitterSample<FloatPacket> &light) {
+            add_light(hit, point, lit, cos_view, albedo, emitter, light);
+        });
+}
+
+void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                             LaneBits lanes, const FloatPacket &cos_view,
+                             const Vec3<FloatPacket> &albedo, uint32_t emitter,
+                             const EmitterSample<FloatPacket> &light) {
+    const FloatPacket zero(0.0f), cosine = dot(light.direction, point.shading_normal);
+    const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
+    lanes &= not_black(light.weight) & to_bits(cos_light > zero);
+    if (lanes == 0)
+        return;
+    const ShadowSegment<FloatPacket> segment =
+        shadow_segment(scene_, offset_, hit, point, emitter, light);
+    const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
+    shadows_[emitter].append(lanes, hit, segment.start, segment.target,
+                             (albedo * share) * light.weight);
 }
 
 // Adds what surfaces emit towards the camera. Returns the lanes to be shaded; those that
@@ -293,87 +300,14 @@ LaneBits TileRenderer::add_emission(const HitPacket &hit,
     return hit.lanes & ~hidden;
 }
 
-// Each round sends the rays that met a hidden emitter on from behind it. It ends: a ray
-// leaves the plane of a face for good, because the offset exceeds the rounding error of its
-// origin.
-void TileRenderer::pass_hidden_emitters() {
-    while (!passing_.ray.empty()) {
-        const PassingRays passing = std::exchange(passing_, {});
-        const size_t count = passing.ray.size();
-        std::vector<float> d[3];
-        for (int k = 0; k < 3; ++k)
-            for (const uint32_t ray : passing.ray)
-                d[k].push_back(samples_.direction(k)[ray]);
-        const std::vector<float> t_min(count, 0.0f);
-        const std::vector<float> t_max(count, std::numeric_limits<float>::max());
-        Hits hits;
-        hits.primitive.resize(count);
-        if (scene_.data.objects) {
-            hits.t.resize(count);
-            hits.instance.resize(count);
-        }
-
-        RayGroup group;
-        group.count = uint32_t(count);
-        for (int k = 0; k < 3; ++k) {
-            group.origin[k] = passing.origin[k].data();
-            group.direction[k] = d[k].data();
-        }
-        group.t_min = t_min.data();
-        group.t_max = t_max.data();
-        trace(group, nullptr, scene_.data.objects ? hits.t.data() : nullptr,
-              hits.primitive.data(), hits.instance.data());
-        for (size_t first = 0; first < count; first += PACKET_WIDTH)
-            shade_passed(passing, hits, first);
-    }
-}
-
-void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
-                                size_t first) {
-    HitPacket hit;
-    LaneArray<uint32_t> rays, faces, instances;
-    LaneArray<float> origin[3], d[3], t;
-    // Lanes behind the last ray repeat it.
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
-        const size_t i = std::min(first + lane, passing.ray.size() - 1);
-        const uint32_t ray = passing.ray[i];
-        const bool is_hit = i == first + lane && hits.primitive[i] != NO_PRIMITIVE;
-        hit.lanes |= LaneBits(is_hit) << lane;
-        rays[lane] = ray;
-        faces[lane] = hits.primitive[i];
-        t[lane] = scene_.data.objects ? hits.t[i] : 0;
-        instances[lane] = scene_.data.objects ? hits.instance[i] : NO_INSTANCE;
-        for (int k = 0; k < 3; ++k) {
-            origin[k][lane] = passing.origin[k][i];
-            d[k][lane] = samples_.direction(k)[ray];
-        }
-    }
-    if (hit.lanes == 0)
-        return;
-    for (int k = 0; k < 3; ++k) {
-        hit.origin[k] = load<FloatPacket>(origin[k]);
-        hit.direction[k] = load<FloatPacket>(d[k]);
-    }
-    hit.ray = load<UIntPacket>(rays);
-    hit.faces = load<UIntPacket>(faces);
-    hit.t = load<FloatPacket>(t);
-    hit.instances = load<UIntPacket>(instances);
-    shade(hit, surface_of(scene_, hit, false));
-}
-
 void TileRenderer::add_reflected_light() {
     float *cost = target_.cost ? cost_.data() : nullptr;
-    float *red = values_[0].data(), *green = values_[1].data(), *blue = values_[2].data();
+    const std::array<float *, 3> colours{values_[0].data(), values_[1].data(),
+                                         values_[2].data()};
     for (ShadowRays &shadow : shadows_)
-        shadow.trace(scene_.data, options_, counters_.shadow, cost,
-                     [&](uint32_t ray, Vec3f light) {
-                         red[ray] += light.x;
-                         green[ray] += light.y;
-                         blue[ray] += light.z;
-                     });
+        shadow.trace(scene_.data, options_, counters_.shadow, cost, colours);
     if (bsdf_rays_)
-        bsdf_rays_->trace(options_, counters_.bsdf, cost,
-                          std::array<float *, 3>{red, green, blue});
+        bsdf_rays_->trace(options_, counters_.bsdf, cost, colours);
 }
 
 void TileRenderer::write(const PixelGroup &group) {

@@ -7,6 +7,7 @@
 #include "mlrta/trace.h"
 #include "render/bsdf_rays.h"
 #include "render/camera_samples.h"
+#include "render/face_cache.h"
 #include "render/hit_packet.h"
 #include "render/picture_film.h"
 #include "render/pixel_group.h"
@@ -95,6 +96,10 @@ private:
     void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             LaneBits lanes, const FloatPacket &cos_view,
                             const Vec3<FloatPacket> &albedo, uint32_t sample);
+    void add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
+                   LaneBits lanes, const FloatPacket &cos_view,
+                   const Vec3<FloatPacket> &albedo, uint32_t emitter,
+                   const EmitterSample<FloatPacket> &light);
     // In bsdf_light.cpp.
     void shade_in_both_ways(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             const UIntPacket &shapes, LaneBits lanes,
@@ -104,7 +109,7 @@ private:
                              const Scattering &scattering, uint32_t sample);
     LaneBits add_emission(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                           const UIntPacket &shapes, LaneBits seen_from_front);
-    void pass_hidden_emitters();
+    void pass_hidden_emitters(); // in hidden_emitters.cpp
     // What rays hit, by ray; distances and instances only if they are wanted.
     struct Hits {
         std::vector<float> t;
@@ -112,7 +117,8 @@ private:
     };
     void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
                uint32_t *instance);
-    void shade_passed(const PassingRays &passing, const Hits &hits, size_t first);
+    void shade_passed(const PassingRays &passing, const Hits &hits,
+                      size_t first); // as well
     void add_reflected_light();
     void write(const PixelGroup &group);
 
@@ -124,6 +130,7 @@ private:
     ShadowOffset offset_;
     TileTarget target_;
     RenderCounters counters_;
+    FaceCache faces_;
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.

@@ -1,5 +1,6 @@
 #include "traverse/wide.h"
 
+#include "base/block_order.h"
 #include "geometry/sheared_volumes.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"

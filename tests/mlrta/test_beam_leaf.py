@@ -71,10 +71,10 @@ class ExactBeam:
 @pytest.mark.parametrize("spread", [1e-3, 0.03, 0.4])
 def test_rectangles_hold_all_rays(core: ModuleType, spread: float) -> None:
     rng = np.random.default_rng(SEED)
-    for _ in range(10):
-        directions = bundle(rng, spread)
+    for count in [256] * 7 + [40, 1000, 1024]:
+        directions = bundle(rng, spread, count)
         exact = ExactBeam(core.beam_leaf_selftest.Beam(ORIGIN, directions), directions)
-        assert len(exact.rays) > 100, SEED
+        assert len(exact.rays) > 0.4 * count, SEED
         u, v, c, s, half_p, half_q = map(Fraction, exact.told["rectangle"])
         for ray in exact.rays:
             du, dv = exact.slopes[ray][0] - u, exact.slopes[ray][1] - v
@@ -159,9 +159,12 @@ def test_forms_are_as_near_as_they_say(core: ModuleType, spread: float) -> None:
 @pytest.mark.parametrize("spread", [1e-3, 0.05, 0.4])
 def test_no_triangle_that_is_hit_is_rejected(core: ModuleType, spread: float) -> None:
     rng = np.random.default_rng(SEED)
-    hit = rejected = 0
-    for _ in range(12):
-        directions = bundle(rng, spread, 64)
+    hit = rejected = rejected_by_runs = 0
+    for count in [64] * 12 + [600]:
+        # Runs of 256 rays are parted a little, so that they are not all alike.
+        directions = bundle(rng, spread, count)
+        shift = np.arange(count)[:, None] // 256 * np.float32(spread)
+        directions += shift * np.abs(directions).max(1, keepdims=True)
         beam = core.beam_leaf_selftest.Beam(ORIGIN, directions)
         exact = ExactBeam(beam, directions)
         triangles = triangles_ahead(rng, directions)
@@ -169,14 +172,18 @@ def test_no_triangle_that_is_hit_is_rejected(core: ModuleType, spread: float) ->
         for n in range(8):
             kept = (told["possible"] | told["unsafe"]) >> n & 1
             rejected += not kept
+            kept_by_runs = [bits >> n & 1 for bits in told["possible_for_runs"]]
+            rejected_by_runs += bool(told["possible"] >> n & 1) and not all(kept_by_runs)
             for ray in exact.rays:
                 edges, along, volume = volumes(ORIGIN, directions[ray], triangles[n])
                 same = all(e >= 0 for e in edges) or all(e <= 0 for e in edges)
                 if same and any(edges) and along * volume > 0:
                     hit += 1
                     assert kept, (SEED, n, ray)
+                    assert kept_by_runs[ray // 256] or told["unsafe"] >> n & 1
     assert hit > 8, SEED
     assert rejected > 0 or spread > 0.1, SEED
+    assert rejected_by_runs > 0, SEED
 
 
 @each_core
@@ -276,3 +283,30 @@ def test_few_rays_among_many_triangles(core: ModuleType) -> None:
         tree.closest_hit(*rays, *interval(rays, 0, np.inf), options, counters)
         assert counters["beams"] > 0
         assert (counters["fallbacks"] > 0) == given_up
+
+
+@each_core
+def test_surfaces_that_lie_in_one_plane(core: ModuleType) -> None:
+    """Equal distances go to the lowest number, whichever triangle a beam meets first."""
+    rng = np.random.default_rng(SEED)
+    any_plane = rng.uniform(-1, 1, (30, 3, 3))
+    any_plane[:, :, 2] += 4
+    across = rng.uniform(-1, 1, (30, 3, 3))
+    across[:, :, 2] = rng.choice([3, 3.5], (30, 1))
+    triangles = np.concatenate([any_plane, across]).astype(np.float32)
+    nearly = triangles.copy()
+    nearly[:, 1, 2] = np.nextafter(nearly[:, 1, 2], np.float32(9))
+    scene = np.concatenate([triangles, triangles[:, [1, 2, 0]], triangles[:, ::-1], nearly])
+    scene = scene[rng.permutation(len(scene))]
+    faces = np.arange(3 * len(scene), dtype=np.uint32).reshape(-1, 3)
+    tree = build(core, (np.ascontiguousarray(scene.reshape(-1, 3)), faces))
+    directions = np.asarray(rng.uniform(-0.3, 0.3, (3000, 3)), np.float32)
+    directions[:, 2] = 1
+    rays = np.zeros_like(directions), directions
+    expected = closest(tree, rays, BRUTE_FORCE)
+    assert np.count_nonzero(expected.face >= 0) > 1000, SEED
+    for options in (BEAM_LEAF, ADAPTIVE):
+        closest(tree, rays, options).assert_same(expected)
+    counters: dict[str, int] = {}
+    tree.closest_hit(*rays, *interval(rays, 0, np.inf), BEAM_LEAF, counters)
+    assert counters["double_tests"] > 1000, SEED

@@ -14,6 +14,8 @@ from tracing import Options, Rays, build, closest, each_core, interval, occluded
 SEED = 20261128
 PACKETS: Options = {"traversal": "packet"}
 ADAPTIVE: Options = {"traversal": "adaptive"}
+# Of 256 rays, in whatever order they come.
+SMALL_BEAMS: Options = {"traversal": "beam_leaf", "minimum_tile": 16}
 WIDTH, HEIGHT = 512, 37
 ORIGIN = np.array([0.5, 0.5, -2.5], np.float32)
 
@@ -66,9 +68,7 @@ def test_hits_are_those_of_packets(core: ModuleType, order: Any) -> None:
 def beam_steps(tree: Any, directions: npt.NDArray[np.float32]) -> int:
     counters: dict[str, int] = {}
     rays = rays_of(directions)
-    tree.closest_hit(
-        *rays, *interval(rays, 0, np.inf), {"traversal": "beam_leaf"}, counters
-    )
+    tree.closest_hit(*rays, *interval(rays, 0, np.inf), SMALL_BEAMS, counters)
     return counters["beam_steps"]
 
 

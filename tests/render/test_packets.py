@@ -79,6 +79,7 @@ def test_weights_equal_those_of_the_queries() -> None:
     )
     hits = np.flatnonzero(primitive >= 0)
     assert len(hits) > 500
+    different = 0
     for first in range(0, len(hits) - LANES, LANES):
         some = hits[first : first + LANES]
         packet = core.render_selftest.hit_packet(
@@ -90,6 +91,24 @@ def test_weights_equal_those_of_the_queries() -> None:
         weights = bits(packet["weights"])
         np.testing.assert_array_equal(weights[:, 0], bits(u[some]))
         np.testing.assert_array_equal(weights[:, 1], bits(v[some]))
+        corners = vertices.reshape(100, 3, 3)[primitive[some]]
+        points = interpolated(corners, u[some], v[some])
+        different += np.count_nonzero(bits(packet["p"]) != bits(points))
+        np.testing.assert_allclose(packet["p"], points, rtol=1e-6, atol=1e-6)
+    # Weights of single precision would make every second number another one.
+    assert different < 0.001 * 3 * len(hits)
+
+
+def interpolated(
+    corners: npt.NDArray[np.float32], u: npt.NDArray[np.float32], v: npt.NDArray[np.float32]
+) -> npt.NDArray[np.float32]:
+    """Points of N triangles, corners (N, 3, 3), by the weights (N,) of the second and third
+    corner: rounded as fused operations of single precision do it, but for double rounding.
+    """
+    a, b, c = (corners[:, k].astype(np.float64) for k in range(3))
+    first = (np.float32(1) - u - v).astype(np.float64)[:, None]
+    sum_of_two = b * u[:, None] + (c * v[:, None]).astype(np.float32)
+    return np.asarray(a * first + sum_of_two.astype(np.float32), np.float32)
 
 
 @pytest.mark.parametrize(

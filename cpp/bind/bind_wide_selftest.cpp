@@ -1,0 +1,91 @@
+// What only the tests see of the wide tree.
+#include "bind/arrays.h"
+#include "bind/bind.h"
+#include "bind/build_options.h"
+#include "geometry/sheared_volumes.h"
+#include "kdtree/builder.h"
+#include "kdtree/wide_maker.h"
+#include "traverse/load_packet.h"
+#include "traverse/wide_rays.h"
+
+#include <cstring>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/pair.h>
+#include <vector>
+
+namespace nb = nanobind;
+
+namespace mlrt {
+
+namespace {
+
+using TriangleArray = nb::ndarray<const float, nb::ndim<3>, nb::shape<-1, 3, 3>,
+                                  nb::c_contig, nb::device::cpu>;
+using Point = std::array<float, 3>;
+
+// The words that each of them consists of.
+template <typename T>
+nb::object words_of(const HugeArray<T> &values) {
+    constexpr size_t WORDS = sizeof(T) / sizeof(uint32_t);
+    std::vector<uint32_t> words(values.size() * WORDS);
+    if (!words.empty())
+        std::memcpy(words.data(), values.data(), values.bytes());
+    return to_numpy<uint32_t>(std::move(words), {values.size(), WORDS});
+}
+
+nb::dict wide_tree(const TriangleArray &array, const nb::kwargs &options) {
+    HugeArray<Triangle> triangles(array.shape(0));
+    if (!triangles.empty())
+        std::memcpy(static_cast<void *>(triangles.data()), array.data(), triangles.bytes());
+    const BuiltTree built =
+        *build_kd_tree(std::move(triangles), build_options_from(options));
+    const WideTree wide = make_wide_tree(built.tree);
+    nb::dict dict;
+    dict["root"] = wide.root.bits();
+    dict["nodes"] = words_of(wide.nodes);
+    dict["blocks"] = words_of(wide.blocks);
+    return dict;
+}
+
+// One bit a triangle: those that the ray certainly hits, and certainly misses.
+std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &direction,
+                                      const TriangleArray &eight) {
+    if (eight.shape(0) != BLOCK_WIDTH)
+        throw nb::value_error("eight triangles");
+    const float zero = 0, one = 1;
+    RayGroup group;
+    group.count = 1;
+    for (int k = 0; k < 3; ++k) {
+        group.origin[k] = &origin[size_t(k)];
+        group.direction[k] = &direction[size_t(k)];
+    }
+    group.t_min = &zero;
+    group.t_max = &one;
+    const auto [packet, extreme] = load_packet<LaneOrigins>(group, 0);
+    if (packet.active != 1)
+        throw nb::value_error("a moderate direction");
+    WideRays rays;
+    rays.add(packet, 1, 0);
+    std::array<std::array<float, BLOCK_WIDTH>, 9> coordinates;
+    for (size_t i = 0; i < BLOCK_WIDTH; ++i)
+        for (size_t k = 0; k < 9; ++k)
+            coordinates[k][i] = eight(i, k / 3, k % 3);
+    const ShearedRay sheared({origin[0], origin[1], origin[2]}, rays.main_axis[0],
+                             rays.shear_x[0], rays.shear_y[0]);
+    const ShearedVolumes<FloatBlock> volumes(sheared, coordinates);
+    return {volumes.certain_hits(), volumes.certain_misses()};
+}
+
+} // namespace
+
+void bind_wide_selftest(nb::module_ &m) {
+    nb::module_ s = m.def_submodule("wide_selftest");
+    s.def("wide_tree", &wide_tree, nb::arg("triangles"), nb::arg("options"),
+          "The bits of the root, and nodes (N, 64) and blocks (N, 80) as 32-bit words as "
+          "they lie in memory.");
+    s.def("decided", &decided);
+    s.attr("max_wide_depth") = MAX_WIDE_DEPTH;
+}
+
+} // namespace mlrt

@@ -1,0 +1,181 @@
+"""The wide tree holds what the kd-tree refers to, where rays look for it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import workloads
+from kd_trees import each_builder
+
+import mlrt_plugin
+from mlrt_plugin._dispatch import core
+
+SEED = 20261128
+BLOCK = np.uint32(1 << 31)
+NO_PRIMITIVE = np.uint32(0xFFFFFFFF)
+SCENES = sorted(workloads.scenes(np.random.default_rng(SEED)))
+
+Box = tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]
+
+
+class WideTree:
+    """Nodes and blocks by the layout in ``cpp/kdtree/wide_tree.h``."""
+
+    def __init__(self, triangles: npt.NDArray[np.float32], **options: object) -> None:
+        self.triangles = np.ascontiguousarray(triangles, np.float32)
+        found = core.wide_selftest.wide_tree(self.triangles, **options)
+        self.root = found["root"]
+        nodes = found["nodes"]
+        self.faces = nodes[:, :48].view(np.float32).reshape(-1, 2, 3, 8)
+        self.children, self.back_to_front = nodes[:, 48:56], nodes[:, 56:]
+        blocks = found["blocks"]
+        self.coordinates = blocks[:, :72].view(np.float32).reshape(-1, 3, 3, 8)
+        self.numbers = blocks[:, 72:]
+
+    def walk(self) -> Iterator[tuple[int, list[Box], int]]:
+        """Blocks, the boxes above each of them, and how many nodes."""
+        pending: list[tuple[int, list[Box]]] = [(self.root, [])]
+        while pending:
+            child, boxes = pending.pop()
+            if child & int(BLOCK):
+                yield child & ~int(BLOCK), boxes, len(boxes)
+                continue
+            for i in range(8):
+                lo, hi = self.faces[child, :, :, i]
+                if np.all(lo <= hi):
+                    pending.append((int(self.children[child, i]), [*boxes, (lo, hi)]))
+
+    def nodes(self) -> set[int]:
+        seen, pending = set(), [self.root]
+        while pending:
+            child = pending.pop()
+            if child & int(BLOCK):
+                continue
+            seen.add(child)
+            there = np.all(self.faces[child, 0] <= self.faces[child, 1], axis=0)
+            pending += [int(c) for c in self.children[child, there]]
+        return seen
+
+
+def wide_tree(name: str, builder: str) -> WideTree:
+    vertices, faces = workloads.scenes(np.random.default_rng(SEED))[name]
+    return WideTree(vertices[faces], builder=builder)
+
+
+@each_builder
+@pytest.mark.parametrize("name", SCENES)
+def test_each_point_of_a_triangle_is_found(name: str, builder: str) -> None:
+    rng = np.random.default_rng(SEED)
+    tree = wide_tree(name, builder)
+    homes: dict[int, list[list[Box]]] = {}
+    for block, boxes, depth in tree.walk():
+        assert depth <= core.wide_selftest.max_wide_depth
+        for lane, number in enumerate(tree.numbers[block]):
+            if number != NO_PRIMITIVE:
+                homes.setdefault(int(number), []).append(boxes)
+                np.testing.assert_array_equal(
+                    tree.coordinates[block, :, :, lane], tree.triangles[number]
+                )
+    assert homes
+    some = rng.permutation(sorted(homes))[:60]
+    for number in some:
+        corners = [[Fraction(float(x)) for x in v] for v in tree.triangles[number]]
+        for weights in [(1, 0, 0), (0, 1, 0), (0, 0, 1), *rng.integers(1, 99, (6, 3))]:
+            total = sum(int(w) for w in weights)
+            point = [
+                sum(int(w) * c[k] for w, c in zip(weights, corners, strict=True)) / total
+                for k in range(3)
+            ]
+            assert any(
+                all(
+                    Fraction(float(lo[k])) <= point[k] <= Fraction(float(hi[k]))
+                    for lo, hi in boxes
+                    for k in range(3)
+                )
+                for boxes in homes[int(number)]
+            ), (SEED, name, builder, number, weights)
+
+
+@each_builder
+@pytest.mark.parametrize("name", SCENES)
+def test_no_face_that_can_be_hit_is_missing(name: str, builder: str) -> None:
+    tree = wide_tree(name, builder)
+    held = {int(n) for block, _, _ in tree.walk() for n in tree.numbers[block]}
+    expected = {
+        i
+        for i, triangle in enumerate(tree.triangles)
+        if not core.kdtree_selftest.is_degenerate([tuple(map(float, v)) for v in triangle])
+    }
+    assert held - {int(NO_PRIMITIVE)} == expected
+
+
+def test_children_come_from_back_to_front() -> None:
+    """A child that lies wholly behind another one along an axis, and not in front of it
+    along one, comes before it; but for few, where a large leaf was divided and boxes
+    overlap."""
+    compared = wrong = 0
+    for name in SCENES:
+        tree = wide_tree(name, "exact")
+        for node in tree.nodes():
+            lo, hi = tree.faces[node]
+            there = np.flatnonzero(np.all(lo <= hi, axis=0))
+            for octant, word in enumerate(tree.back_to_front[node]):
+                order = [int(word) >> 4 * i & 15 for i in range(8)]
+                assert sorted(order) == list(range(8))
+                # Mirrored so that the ray goes towards greater coordinates.
+                down = [bool(octant >> k & 1) for k in range(3)]
+                begin = np.where(down, -hi.T, lo.T)
+                end = np.where(down, -lo.T, hi.T)
+                for a, b in itertools.permutations(there, 2):
+                    if np.any(begin[a] > end[b]) and not np.any(end[a] <= begin[b]):
+                        compared += 1
+                        wrong += order.index(a) > order.index(b)
+    assert compared > 3000
+    assert wrong < compared // 100, (SEED, wrong, compared)
+
+
+def test_no_triangles_make_a_tree_without_blocks() -> None:
+    tree = WideTree(np.zeros((0, 3, 3), np.float32))
+    assert list(tree.walk()) == []
+    assert tree.nodes() == {tree.root}
+
+
+def test_many_triangles_in_one_place_are_divided() -> None:
+    tree = WideTree(np.tile(np.float32([[0, 0, 0], [1, 0, 0], [0, 1, 0]]), (5000, 1, 1)))
+    numbers = np.concatenate([tree.numbers[block] for block, _, _ in tree.walk()])
+    assert sorted(numbers[numbers != NO_PRIMITIVE]) == list(range(5000))
+    assert max(depth for _, _, depth in tree.walk()) <= core.wide_selftest.max_wide_depth
+
+
+def bytes_after(rays: int, times: int, **options: object) -> int:
+    rng = np.random.default_rng(SEED)
+    tree = mlrt_plugin.KdTree(*workloads.sphere(4), **options)
+    origins = rng.uniform(-1, 1, (rays, 3)).astype(np.float32)
+    for _ in range(times):
+        tree.any_hit(origins, -origins[::-1])
+    found: int = tree.report["wide_bytes"]
+    return found
+
+
+def test_it_is_made_once_enough_rays_go_alone() -> None:
+    few = 500
+    references = mlrt_plugin.KdTree(*workloads.sphere(4)).report["references"]
+    assert 2 * few < references < 20 * few
+    assert bytes_after(few, 2) == 0
+    assert bytes_after(few, 50) > 0
+    assert bytes_after(50 * few, 1) > 0
+    assert bytes_after(50 * few, 1, builder="lazy") == 0
+
+
+def test_rays_with_a_common_origin_leave_it_alone() -> None:
+    tree = mlrt_plugin.KdTree(*workloads.sphere(4))
+    directions = np.random.default_rng(SEED).normal(size=(50_000, 3)).astype(np.float32)
+    tree.closest_hit(np.zeros_like(directions), directions)
+    assert tree.report["wide_bytes"] == 0
+    bytes_of_it = tree.widen()
+    assert tree.report["wide_bytes"] == bytes_of_it > 0
