@@ -53,8 +53,9 @@ PLUGINS = {
 }
 """All plugins of Mitsuba, by the kind of object that they make."""
 NO_LIGHT_SAMPLE = (
-    "black for light samples; by Mitsuba where BSDF samples can find lights in it"
+    "black for light samples; BSDF samples find lights in it, by Mitsuba if it is textured"
 )
+OTHER_NOISE = "; with samplers but `independent` and light samples too, of other noise"
 HIT_BY_MITSUBA = "where Mitsuba shades, it also finds the hits"
 ON_MATERIALS = "on materials of all native shapes, and as `radiance` of rectangles"
 ON_MESHES = "on materials of meshes that are not instanced; else by Mitsuba"
@@ -64,21 +65,24 @@ REMARKS = {
     ("bsdf", "mask"): "of native materials; shadow rays "
     "stop at it, and BSDF samples find lights behind it, as in `direct`",
     ("bsdf", "null"): "BSDF samples find lights behind it",
-    **{("bsdf", plugin): NO_LIGHT_SAMPLE for plugin in SPECULAR},
+    **{("bsdf", plugin): NO_LIGHT_SAMPLE + OTHER_NOISE for plugin in SPECULAR},
+    ("bsdf", "conductor"): NO_LIGHT_SAMPLE,
     **{("texture", plugin): ON_MATERIALS for plugin in LIGHT_TEXTURES},
     ("texture", "mesh_attribute"): ON_MESHES,
     ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
-    "textures on rectangles that are not flipped; else by Mitsuba, as on meshes it depends "
-    "on Embree which of the faces at a point of the texture glows",
+    "textures on rectangles that are not flipped; else by Mitsuba. On meshes it depends on "
+    "Embree which of the faces at a point of the texture glows; of flipped rectangles "
+    "Mitsuba's emitter samples take the other side to glow than its BSDF samples",
     ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
     ("emitter", "spot"): "in constant colours, and without scale; else by Mitsuba",
     ("emitter", "directional"): "without scale; else by Mitsuba",
-    ("emitter", "projector"): "rarely used, so that its sampling is not worth code here; "
-    "the image is the same",
+    ("emitter", "projector"): "not modelled; Mitsuba's shading gives the same image in 3 "
+    "times the time of native shading (median of the scenes in `compare/results/scenes.md` "
+    "that both render)",
     ("sensor", "orthographic"): "without shear; else by Mitsuba",
     ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
     ("integrator", "direct"): "with up to 256 samples of emitters and of BSDFs natively; "
-    "with more, and for lights in mirrors and glass, by Mitsuba",
+    "with more by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1, or 2, which is taken as `direct`; else "
     "`--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "

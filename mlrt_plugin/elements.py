@@ -41,12 +41,14 @@ class Element:
     def walk_new(self, seen: set[int]) -> Iterator[Element]:
         """This element and all that it holds, without those whose `id` is in `seen`, which
         grows by those that are passed."""
-        if id(self) in seen:
-            return
-        seen.add(id(self))
-        yield self
-        for _, child in self.children:
-            yield from child.walk_new(seen)
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            if id(element) in seen:
+                continue
+            seen.add(id(element))
+            yield element
+            waiting.extend(child for _, child in reversed(element.children))
 
     def __str__(self) -> str:
         name = f"{self.kind} '{self.plugin}'"
@@ -113,8 +115,7 @@ def from_state(state: Any) -> list[Element]:
     places = Places([Path(str(file)) for file in state.files])
     # Scenes have a hundred thousand nodes: names of enumerations are looked up once.
     kinds = {t: KINDS.get(t.name, t.name.lower()) for t in mi.ObjectType}
-    types: Any = mi.Properties.Type
-    reference, instance = types.ResolvedReference, types.Object
+    reference: Any = mi.Properties.ResolvedReference
     all_properties = []
     for node in state.nodes:
         props = node.props
@@ -129,10 +130,10 @@ def from_state(state: Any) -> list[Element]:
         )
     for props, element in zip(all_properties, elements, strict=True):
         for name in props.keys():  # noqa: SIM118 (Properties is no mapping)
-            kind, value = props.type(name), props[name]
-            if kind is reference:
+            value = props[name]
+            if isinstance(value, reference):
                 element.children.append((name, elements[value.index()]))
-            elif kind is instance and value.variant_name():
+            elif isinstance(value, mi.Object) and value.variant_name():
                 element.children.append((name, from_object(value, name)))
             else:
                 element.properties[name] = value

@@ -80,11 +80,12 @@ def reason_against(element: Element) -> str:
         return "the texture of a spot is not supported yet"
     if plugin in ("spot", "directional") and scales(element.properties.get("to_world")):
         return "its to_world scales, which is not supported yet"
-    textures = [child.plugin for child in element.children_of("texture")]
-    nested = {part.plugin for part in element.walk()}
-    if kind == "emitter" and nested & set(VARYING) - set(LIGHT_TEXTURES):
+    if kind == "emitter" and any(
+        part.plugin in VARYING and part.plugin not in LIGHT_TEXTURES
+        for part in element.walk()
+    ):
         return f"of textures it can have {', '.join(LIGHT_TEXTURES)} only so far"
-    if kind == "shape" and textures:
+    if kind == "shape" and any(element.children_of("texture")):
         return "textures that are attributes of a shape are not supported yet"
     if kind == "shape" and has_textured_light(element):
         if plugin != "rectangle":
@@ -169,6 +170,7 @@ def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:
             e.id,
             e.where,
             "" if e.kind == "integrator" else reason_against(e),
+            e.kind == "bsdf" and any(part.plugin in VARYING for part in e.walk()),
         )
         for e in found
     )

@@ -196,11 +196,13 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
                 "natively: raise the samples per pixel instead"
             )
     if takes_bsdf_samples(features, lighting):
-        specular = [f for f in features if f.kind == "bsdf" and f.plugin in SPECULAR]
+        specular = [
+            f for f in features if f.kind == "bsdf" and f.plugin in SPECULAR and f.varies
+        ]
         if specular:
             return (
                 f"lights in {specular[0]} are found by BSDF samples, which {name} asks for "
-                "and which are not taken natively of such a material"
+                "and which are not taken natively of such a material with a texture"
             )
     return ""
 

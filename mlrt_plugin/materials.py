@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 import numpy.typing as npt
 
 from . import mitsuba_objects as objects
 from .elements import Element, from_object
-from .errors import UnsupportedFeature
+from .errors import SceneError, UnsupportedFeature
 from .scene_arrays import Vec3
-from .shape_arrays import NONE
+from .shape_arrays import NONE, Specular
 from .textures import VARYING, Surface, TextureTable, child_of
 
 BLACK: Vec3 = (0.0, 0.0, 0.0)
@@ -26,29 +28,38 @@ mirror or let through is found by BSDF samples."""
 
 @dataclass(frozen=True)
 class Side:
-    """What one side of a surface reflects: a colour, or the number of a texture."""
+    """What one side of a surface reflects: a colour, the number of a texture, or what it
+    mirrors and refracts."""
 
     colour: Vec3 = BLACK
     texture: int = NONE
+    specular: Specular | None = None
 
 
 @dataclass(frozen=True)
 class Material:
     """Both sides, and the texture of the share of light that they reflect at all.
 
-    passes: whether light goes straight through.
+    passes: whether light goes straight through. delta: whether no side scatters, so that
+    Mitsuba takes no light sample.
     """
 
     front: Side = Side()
     back: Side = Side()
     opacity: int = NONE
     passes: bool = False
+    delta: bool = False
 
 
 class MaterialTable:
-    """Collects materials; equal ones share a row."""
+    """Collects materials; equal ones share a row.
 
-    def __init__(self) -> None:
+    mirrors: whether BSDF samples look for lights in mirrors and glass, which are black
+    else.
+    """
+
+    def __init__(self, mirrors: bool) -> None:
+        self._mirrors = mirrors
         self.textures = TextureTable()
         self._rows: dict[Material, int] = {}
 
@@ -70,6 +81,25 @@ class MaterialTable:
         """(M, 3) numbers of the textures of front, back and opacity, or NONE."""
         rows = [(m.front.texture, m.back.texture, m.opacity) for m in self._rows]
         return np.array(rows, np.uint32).reshape(-1, 3)
+
+    def speculars(self) -> tuple[Specular, ...]:
+        """All mirrors and glasses, each once."""
+        sides = (s.specular for m in self._rows for s in (m.front, m.back))
+        return tuple(dict.fromkeys(s for s in sides if s is not None))
+
+    def specular_numbers(self) -> tuple[tuple[int, int, bool], ...]:
+        """Numbers of those, of front and back of each row, or NONE, and whether it is
+        delta; empty if none is."""
+        numbers = {specular: number for number, specular in enumerate(self.speculars())}
+        rows = tuple(
+            (
+                NONE if m.front.specular is None else numbers[m.front.specular],
+                NONE if m.back.specular is None else numbers[m.back.specular],
+                m.delta,
+            )
+            for m in self._rows
+        )
+        return rows if numbers else ()
 
     def passes(self) -> tuple[bool, ...]:
         """Which rows let all light straight through; empty if none does."""
@@ -98,6 +128,10 @@ class MaterialTable:
 
     def _read(self, bsdf: Any, element: Element, surface: Surface) -> Material:
         plugin = objects.plugin_name(bsdf)
+        if plugin in SPECULAR and self._mirrors:
+            side = Side(specular=read_specular(bsdf, plugin, f"bsdf of {surface.name}"))
+            behind = Side() if plugin == "conductor" else side
+            return Material(side, behind, delta=True)
         if plugin in DELTA:
             return Material(passes=plugin == "null")
         parts = objects.members(bsdf)
@@ -107,12 +141,12 @@ class MaterialTable:
             nested = list(element.children_of("bsdf"))
             sides = [parts["brdf_0"], parts.get("brdf_1", parts["brdf_0"])]
             front, back = (
-                self._read(side, nested[min(i, len(nested) - 1)], surface).front
-                if nested
-                else self._read(side, element, surface).front
+                self._read(
+                    side, nested[min(i, len(nested) - 1)] if nested else element, surface
+                )
                 for i, side in enumerate(sides)
             )
-            return Material(front, back)
+            return Material(front.front, back.front, delta=front.delta and back.delta)
         if plugin == "mask":
             inner = next(element.children_of("bsdf"), element)
             material = self._read(parts["nested_bsdf"], inner, surface)
@@ -122,7 +156,7 @@ class MaterialTable:
             )
             if material.passes:
                 return material
-            return Material(material.front, material.back, number)
+            return Material(material.front, material.back, number, delta=material.delta)
         raise UnsupportedFeature(
             f"bsdf '{plugin}' of {surface.name} is not supported: only diffuse, twosided, "
             f"mask, {', '.join(DELTA)} are so far"
@@ -134,3 +168,22 @@ class MaterialTable:
             return Side(objects.color(reflectance, f"bsdf of {surface.name}"))
         child = child_of(element, "reflectance", reflectance)
         return Side(texture=self.textures.add_colour(reflectance, child, surface))
+
+
+def read_specular(bsdf: Any, plugin: str, owner: str) -> Specular:
+    """What a mirror or glass does; raises what `mitsuba_objects.color` does."""
+    parts = objects.members(bsdf)
+    colours = {
+        name: objects.color(parts[key], owner)
+        for name, key in {
+            "reflectance": "specular_reflectance",
+            "transmittance": "specular_transmittance",
+            "eta": "eta",
+            "k": "k",
+        }.items()
+        if isinstance(parts.get(key), mi.Object)
+    }
+    ior = 1.0 if plugin == "conductor" else objects.number(parts["eta"])
+    if not (ior > 0 and math.isfinite(ior)):
+        raise SceneError(f"{owner} has an index of refraction of {ior}: make it positive")
+    return Specular(plugin, **colours, ior=ior)

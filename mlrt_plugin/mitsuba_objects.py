@@ -4,7 +4,7 @@ moment."""
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mitsuba as mi
@@ -151,6 +151,18 @@ def vec3(value: Any) -> Vec3:
 def matrix(transform: Any) -> npt.NDArray[np.float64]:
     """The (4, 4) float64 matrix of a transformation."""
     return np.asarray(np.array(transform.matrix), dtype=np.float64).reshape(4, 4)
+
+
+def scalar_matrices(matrices: Iterable[Any], count: int) -> npt.NDArray[np.float64]:
+    """(count, 4, 4) float64 of matrices of a parsed scene's transformations.
+
+    By DLPack, as there may be a hundred thousand, and NumPy takes an array protocol of
+    Dr.Jit's otherwise that is several times slower.
+    """
+    result = np.empty((count, 4, 4))
+    for place, matrix in zip(result, matrices, strict=True):
+        place[:] = np.from_dlpack(matrix)
+    return result
 
 
 def is_singular(to_world: npt.NDArray[np.float64]) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,11 +61,25 @@ counts."""
 T = TypeVar("T")
 
 
+class Once:
+    """Lets something be done a single time."""
+
+    def __init__(self) -> None:
+        self._done = False
+
+    def do(self, refusal: str) -> None:
+        """Raises RuntimeError with that message from the second time on."""
+        if self._done:
+            raise RuntimeError(refusal)
+        self._done = True
+
+
 @dataclass
 class ParsedScene:
     """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``.
 
     resolver: where its files are looked for, those of its <path> elements included.
+    loading: changes the state, in whichever variant, and can be done once.
     """
 
     config: Any
@@ -73,6 +87,7 @@ class ParsedScene:
     elements: list[Element]
     resolver: Any
     name: str
+    loading: Once = field(default_factory=Once)
 
     @property
     def root(self) -> Element:
@@ -301,7 +316,11 @@ def instantiate(
 
 
 def numbered(parsed: ParsedScene) -> dict[str, Element]:
-    """Gives all nodes ids by which to find their elements, and takes integrators out."""
+    """Gives all nodes ids by which to find their elements, and takes integrators out.
+
+    Raises RuntimeError if that has been done before.
+    """
+    parsed.loading.do(f"scene '{parsed.name}' was loaded from this before: parse it anew")
     by_id = {}
     for number, (node, element) in enumerate(
         zip(parsed.state.nodes, parsed.elements, strict=True)

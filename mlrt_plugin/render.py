@@ -270,6 +270,8 @@ def prepare(
         arrays.material_textures,
         others.handle,
         arrays.material_passes,
+        [dataclasses.asdict(specular) for specular in arrays.speculars],
+        arrays.material_speculars,
     )
     return PreparedScene(
         arrays,

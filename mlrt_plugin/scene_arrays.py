@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .object_arrays import ObjectArrays
-from .shape_arrays import NONE, Shape
+from .shape_arrays import NONE, Shape, Specular
 from .texture_arrays import Texture
 
 Vec2 = tuple[float, float]
@@ -119,7 +119,8 @@ class Film:
 class Feature:
     """An element of the scene: a plugin of some kind, and whether it is rendered natively.
 
-    ``reason`` is empty if it is, and otherwise says what is not supported.
+    ``reason`` is empty if it is, and otherwise says what is not supported. ``varies``: of a
+    BSDF, whether it holds a texture that is not the same everywhere.
     """
 
     kind: str
@@ -127,6 +128,7 @@ class Feature:
     id: str = ""
     where: str = ""
     reason: str = ""
+    varies: bool = False
 
     @property
     def native(self) -> bool:
@@ -171,7 +173,9 @@ class SceneArrays:
     materials: (M, 2, 3) float32, linear RGB reflectance of the front and of the back.
     material_textures: (M, 3) uint32, numbers of textures in place of these two, and of the
     opacity, or NONE. material_passes: which materials let all light straight through; empty
-    if none does. uvs: (V, 2) float32; (0, 2) if nothing needs any.
+    if none does. material_speculars: numbers of the `speculars` of the front and of the
+    back, or NONE, and whether no side scatters; empty if there are none.
+    uvs: (V, 2) float32; (0, 2) if nothing needs any.
     spp, base_seed: samples per pixel and seed of the sensor's sampler.
     features: what the scene uses; warnings: what is approximated or ignored, a sentence
     each. shape_names: what messages call the shapes. objects: what is not in these arrays:
@@ -200,6 +204,8 @@ class SceneArrays:
     textures: tuple[Texture, ...] = ()
     material_textures: npt.NDArray[np.uint32] | None = None
     material_passes: tuple[bool, ...] = ()
+    speculars: tuple[Specular, ...] = ()
+    material_speculars: tuple[tuple[int, int, bool], ...] = ()
     uvs: npt.NDArray[np.float32] | None = None
     sampler: Sampler = Sampler()
     environment: npt.NDArray[np.float32] = field(default_factory=no_environment)

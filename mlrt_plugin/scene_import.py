@@ -82,7 +82,7 @@ def import_scene(
     lighting: what to render in place of what the scene's integrator asks for.
     force_direct: whether to render direct illumination where the integrator asks for more.
     summary: what `summarise` gave for the same scene, sensor and defines, so that it is not
-    parsed again; each can be used once.
+    parsed again; each can be used once, and RuntimeError is raised after that.
 
     Raises SceneError if the scene cannot be read or makes no sense, and UnsupportedFeature
     if it uses what is not rendered natively.
@@ -246,8 +246,8 @@ def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
         if element.properties.get("to_world") is not None
     ]
     if moved:
-        matrices = [objects.matrix(e.properties["to_world"]) for e in moved]
-        objects.check_all_invertible(np.stack(matrices), moved)
+        matrices = (e.properties["to_world"].matrix for e in moved)
+        objects.check_all_invertible(objects.scalar_matrices(matrices, len(moved)), moved)
 
 
 def check_files(parsed: parsing.ParsedScene) -> None:
@@ -257,7 +257,7 @@ def check_files(parsed: parsing.ParsedScene) -> None:
     with parsing.resolving_by(parsed.resolver):
         for element in features.used_elements(parsed.root, -1):
             for name in ("bitmap", "data"):
-                if 0 in np.shape(element.properties.get(name, 1)):
+                if name in element.properties and 0 in np.shape(element.properties[name]):
                     raise SceneError(f"{element} has a {name} of no pixels: give it some")
             filename = element.properties.get("filename")
             if filename is None:
@@ -310,7 +310,8 @@ def collect(
     shapes, sources, sensor = by_way.meshes, scene.emitters, scene.sensors[sensor_number]
     shape_names = [name_of(shape) for shape in shapes]
     geometry = meshes.gather(shapes, shape_names)
-    materials = MaterialTable()
+    framed = integrators.takes_bsdf_samples(found, lighting)
+    materials = MaterialTable(mirrors=framed)
     firsts = zip(geometry.first_faces, geometry.first_vertices, strict=True)
     surfaces = [
         Surface(shape, name, *first)
@@ -319,7 +320,6 @@ def collect(
     rows = [materials.add(surface, names) for surface in surfaces]
     lights = [materials.add_light(surface, names) for surface in surfaces]
     textured = materials.uses_coordinates()
-    framed = integrators.takes_bsdf_samples(found, lighting)
     coordinates = gather_coordinates(
         shapes,
         shape_names,
@@ -391,6 +391,8 @@ def collect(
         textures=tuple(materials.textures.textures),
         material_textures=materials.texture_array(),
         material_passes=materials.passes(),
+        speculars=materials.speculars(),
+        material_speculars=materials.specular_numbers(),
         uvs=coordinates.uvs,
         sampler=sampler,
         environment=emitters.environment_of(sources, name_of),

@@ -237,11 +237,16 @@ def placements(
     """
     maps = np.tile(np.eye(3, 4), (len(instances), 1, 1))
     normals = np.tile(np.eye(3), (len(instances), 1, 1))
-    for number, instance in enumerate(instances):
-        to_world = instance.properties.get("to_world")
-        if to_world is not None:
-            maps[number] = np.array(to_world.matrix)[:3]
-            normals[number] = np.array(to_world.inverse_transpose)[:3, :3]
+    moves: dict[int, Any] = {
+        number: instance.properties["to_world"]
+        for number, instance in enumerate(instances)
+        if instance.properties.get("to_world") is not None
+    }
+    rows, count = list(moves), len(moves)
+    matrices = (to_world.matrix for to_world in moves.values())
+    maps[rows] = objects.scalar_matrices(matrices, count)[:, :3]
+    matrices = (to_world.inverse_transpose for to_world in moves.values())
+    normals[rows] = objects.scalar_matrices(matrices, count)[:, :3, :3]
     return maps, normals
 
 

@@ -19,3 +19,16 @@ class Shape:
     vertex_normals: bool = False
     flip_normals: bool = False
     texture_coordinates: bool = False
+
+
+@dataclass(frozen=True)
+class Specular:
+    """A mirror or glass, with the fields of the core's structure of that name in
+    ``render/scene.h``."""
+
+    type: str
+    reflectance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    transmittance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    eta: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    k: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    ior: float = 1.0

@@ -85,11 +85,19 @@ def render(folder: Path, scene: str, spp: int, seed: int, **options: Any) -> Any
     return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
 
 
-def render_file(folder: Path, path: str, spp: int, seed: int, bsdf_samples: int = 0) -> Any:
-    """The picture of ``direct`` with one emitter sample, of a scene file."""
+def render_file(
+    folder: Path,
+    path: str,
+    spp: int,
+    seed: int,
+    bsdf_samples: int = 0,
+    emitter_samples: int = 1,
+) -> Any:
+    """The picture of ``direct``, of a scene file."""
     import mitsuba as mi
 
-    integrator = {"type": "direct", "emitter_samples": 1, "bsdf_samples": bsdf_samples}
+    counts = {"emitter_samples": emitter_samples, "bsdf_samples": bsdf_samples}
+    integrator = {"type": "direct", **counts}
     loaded = mi.load_file(path, optimize=False)
     return mi.render(loaded, integrator=mi.load_dict(integrator), spp=spp, seed=seed)
 

@@ -19,6 +19,7 @@ from mlrt_plugin.threads import thread_count
 
 from .batch_reference import BatchReference, batch_reference
 from .bias import BiasTest, bias_test
+from .disputed_tiles import DisputedTiles, without_disputes
 from .error_curves import Runs
 from .metrics import REL_MSE_EPSILON
 from .mitsuba_renderer import MitsubaRenderer
@@ -74,6 +75,8 @@ class SpeedError:
     rel_mse: np.ndarray[Any, np.dtype[np.float64]]
     """(2, S, rounds) relative MSE against the reference by Mitsuba."""
     bias: BiasTest
+    disputed: DisputedTiles | None
+    """What becomes of a bias without tiles of disputed rays; None if there is none."""
     kernels_from_disk: int
     """Kernels of Mitsuba's first frame that an earlier process had compiled."""
     warnings: tuple[str, ...]
@@ -111,6 +114,8 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
         done = steps - 2 * count * plan.rounds
         seconds, mse, rel_mse = rounds(renderers, references, settings, plan, step)
         threads = int(dr.thread_count())
+        bias = bias_test(references[0].tiles, references[1].tiles)
+        disputed = None if bias.passed else without_disputes(settings, references)
     height, width = references[0].mean.shape[:2]
     return SpeedError(
         settings=settings,
@@ -125,7 +130,8 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
         references=references,
         runs=(Runs(plan.spp, seconds, mse[0]), Runs(plan.spp, seconds, mse[1])),
         rel_mse=rel_mse,
-        bias=bias_test(references[0].tiles, references[1].tiles),
+        bias=bias,
+        disputed=disputed,
         kernels_from_disk=mitsuba.kernels_from_disk,
         warnings=(*renderers[0].warnings, *renderers[1].warnings),
     )

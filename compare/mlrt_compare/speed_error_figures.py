@@ -47,6 +47,7 @@ def figures_of(measured: SpeedError, machine: dict[str, Any]) -> dict[str, Any]:
             "equal_error": measured.runs[1].over_all(equal_error).as_dict(),
         },
         "bias": measured.bias.as_dict(),
+        "disputed_tiles": measured.disputed.as_dict() if measured.disputed else None,
         "break_even_frames": break_even(measured),
         "kernels_from_disk": measured.kernels_from_disk,
         "warnings": list(measured.warnings),
@@ -152,4 +153,6 @@ def reasons(figures: dict[str, Any], measured: SpeedError) -> list[str]:
                 f"at {spp} spp the ratio of both MSE is {value}, so the estimators are not "
                 "the same"
             )
-    return found + measured.bias.reasons()
+    if measured.disputed is None:
+        return found + measured.bias.reasons()
+    return found + measured.disputed.reasons()

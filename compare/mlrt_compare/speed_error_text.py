@@ -94,8 +94,10 @@ def markdown(figures: dict[str, Any]) -> str:
         f"{bias['uniform_p']:.2g}, means with p {bias['mean_p']:.2g}; MLRT's mean is "
         f"{100 * low:+.4f} % to {100 * high:+.4f} % from Mitsuba's (99 %). The noise of "
         f"the tiles has the same variance with p {bias['spread_smallest_p']:.2g}; over "
-        f"all, MLRT's is {bias['variance_ratio']:.3f} times Mitsuba's.",
+        f"all, MLRT's is {bias['variance_ratio']:.3f} times Mitsuba's. {quiet_tiles(bias)}",
     ]
+    if figures["disputed_tiles"] is not None:
+        lines += ["", disputed_tiles(figures["bias"], figures["disputed_tiles"])]
     even = figures["break_even_frames"]
     lines += [
         "",
@@ -104,6 +106,37 @@ def markdown(figures: dict[str, Any]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def quiet_tiles(bias: dict[str, Any]) -> str:
+    """What became of the tiles that Welch's test leaves out."""
+    count, differing = bias["quiet_tiles"], bias["differing_quiet"]
+    if not count:
+        return "All tiles have more noise than rounding."
+    differ = {0: "none of them differs", 1: "1 of them differs"}
+    return (
+        f"{count} tiles have less noise than rounding; "
+        f"{differ.get(differing, f'{differing} of them differ')} by more than both explain "
+        f"(smallest p {bias['quiet_smallest_p']:.2g} for all together)."
+    )
+
+
+def disputed_tiles(bias: dict[str, Any], disputed: dict[str, Any]) -> str:
+    """What failed among all tiles, and what remains without those of disputed rays."""
+    judged, others = disputed["judgement"], disputed["others"]
+    told = "none are left" if others is None else "the others pass"
+    if others is not None and not others["passed"]:
+        told = "of the others " + "; ".join(others["reasons"])
+    return (
+        f"Of all tiles: {'; '.join(bias['reasons'])}. With the same {disputed['spp']} "
+        f"samples a pixel, {judged['rays']} of {disputed['rays']} rays hit something else "
+        f"in Mitsuba; by exact arithmetic both are right in {judged['both_right']} (faces "
+        f"equally near, or rays that differ by rounding), only MLRT in "
+        f"{judged['only_ours']}, only Mitsuba in {judged['only_theirs']}, neither in "
+        f"{judged['both_wrong']}; {judged['not_judged']} are not judged. All other pixels "
+        f"differ by {disputed['rmse']:.1e} of the mean (RMS). Without the "
+        f"{disputed['tiles']} tiles of such rays, {told}."
+    )
 
 
 def estimate(value: dict[str, Any], digits: int = 2) -> str:

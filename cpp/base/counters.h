@@ -25,6 +25,7 @@ struct Counters {
     uint64_t splits = 0;          // tiles that were split
     uint64_t fallbacks = 0;       // beams that say nothing, or were given up for packets
     uint64_t blockers = 0;        // triangles found to cover a tile's beam
+    uint64_t regrouped_rays = 0;  // rays laid out anew for smaller or tidier beams
 
     // What all of it took, counted alike: visits of nodes and tests of triangles.
     uint64_t work() const {
@@ -51,6 +52,7 @@ struct Counters {
         splits += other.splits;
         fallbacks += other.fallbacks;
         blockers += other.blockers;
+        regrouped_rays += other.regrouped_rays;
         return *this;
     }
 };

@@ -229,20 +229,20 @@ void bind_objects(nb::module_ &m) {
         m, "Objects",
         "Analytic shapes and instances of groups, which rays are traced against beside a "
         "tree; see objects/object_set.h for how faces are numbered and ties decided.")
-        .def(nb::new_(&make_objects), nb::arg("analytic_types"), nb::arg("analytic_frames"),
-             nb::arg("scene_analytic_count"), nb::arg("groups"), nb::arg("instance_groups"),
-             nb::arg("instance_maps"), nb::arg("instance_normals"), nb::arg("first_face"),
-             "analytic_types: uint32 (A,), 0 sphere, 1 disk, 2 cylinder; analytic_frames: "
-             "float64 (A, 3, 4), from the shape's frame to the scene, or to its group: the "
-             "first scene_analytic_count are of the scene, the others of the groups in "
-             "turn. groups: dicts of tree (KdTree or None), faces (uint32 (F, 3), or no "
-             "rows "
-             "where no shape has either of the following), normals (float32 (V, 3) or (0, "
-             "3)), uvs (float32 (V, 2) or (0, 2); may be left out), and analytic_count. "
-             "instance_groups: uint32 (I,); instance_maps: float64 (I, 3, "
-             "4), from the group to the world; instance_normals: float64 (I, 3, 3), the "
-             "same for normals. first_face: how many faces the tree beside has. Raises "
-             "ValueError or TypeError for what does not fit together.")
+        .def(
+            nb::new_(&make_objects), nb::arg("analytic_types"), nb::arg("analytic_frames"),
+            nb::arg("scene_analytic_count"), nb::arg("groups"), nb::arg("instance_groups"),
+            nb::arg("instance_maps"), nb::arg("instance_normals"), nb::arg("first_face"),
+            "analytic_types: uint32 (A,), 0 sphere, 1 disk, 2 cylinder; analytic_frames: "
+            "float64 (A, 3, 4), from the shape's frame to the scene, or to its group: the "
+            "first scene_analytic_count are of the scene, the others of the groups in "
+            "turn. groups: dicts of tree (KdTree or None), faces (uint32 (F, 3), or no "
+            "rows where no shape has either of the following), normals (float32 (V, 3) or "
+            "(0, 3)), uvs (float32 (V, 2) or (0, 2); may be left out), and analytic_count. "
+            "instance_groups: uint32 (I,); instance_maps: float64 (I, 3, 4), from the "
+            "group to the world; instance_normals: float64 (I, 3, 3), the same for "
+            "normals. first_face: how many faces the tree beside has. Raises "
+            "ValueError or TypeError for what does not fit together.")
         .def("closest_hit", &closest_hit, nb::arg("tree"), nb::arg("origins"),
              nb::arg("directions"), nb::arg("t_min"), nb::arg("t_max"), nb::arg("options"),
              "The nearest hits of rays in the tree and among the objects: t, number of the "

@@ -12,9 +12,11 @@
 #include <cstring>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 namespace nb = nanobind;
@@ -64,6 +66,46 @@ void add_textures(std::vector<Material> &materials,
         materials[i].front_texture = texture_number(in[0], i, texture_count);
         materials[i].back_texture = texture_number(in[1], i, texture_count);
         materials[i].opacity = texture_number(in[2], i, texture_count);
+    }
+}
+
+Specular specular_from(nb::handle dict, const std::string &name) {
+    Fields fields(dict, name);
+    Specular specular;
+    specular.type = fields.choice<SpecularType>(
+        "type", {{"conductor", SpecularType::conductor},
+                 {"dielectric", SpecularType::dielectric},
+                 {"thindielectric", SpecularType::thindielectric}});
+    specular.reflectance = fields.vector("reflectance", specular.reflectance);
+    specular.transmittance = fields.vector("transmittance", specular.transmittance);
+    specular.eta = fields.vector("eta", specular.eta);
+    specular.k = fields.vector("k", specular.k);
+    specular.ior = fields.number("ior", specular.ior);
+    fields.finish();
+    if (!(specular.ior > 0))
+        refuse_value(name + "['ior'] must be positive.");
+    return specular;
+}
+
+using SpecularSides = std::vector<std::tuple<uint32_t, uint32_t, bool>>;
+
+void add_speculars(SceneData &scene, const nb::list &speculars,
+                   const SpecularSides &sides) {
+    for (size_t i = 0; i < speculars.size(); ++i)
+        scene.speculars.push_back(specular_from(speculars[i], numbered("speculars", i)));
+    if (!sides.empty() && sides.size() != scene.materials.size())
+        refuse_value(
+            "material_speculars must be empty or have as many entries as materials.");
+    for (size_t i = 0; i < sides.size(); ++i) {
+        const auto [front, back, delta] = sides[i];
+        for (const uint32_t side : {front, back})
+            if (side != NONE && side >= scene.speculars.size())
+                refuse_value(numbered("material_speculars", i) + " refers to specular " +
+                             std::to_string(side) + ", but there are " +
+                             std::to_string(scene.speculars.size()) + ".");
+        scene.materials[i].front_specular = front;
+        scene.materials[i].back_specular = back;
+        scene.materials[i].delta = delta;
     }
 }
 
@@ -187,8 +229,8 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
                        const Array<float> &environment,
                        const std::optional<Array<float>> &uvs, const nb::list &textures,
                        const std::optional<Array<uint32_t>> &material_textures,
-                       const nb::object &objects,
-                       const std::vector<bool> &material_passes) {
+                       const nb::object &objects, const std::vector<bool> &material_passes,
+                       const nb::list &speculars, const SpecularSides &sides) {
     SceneData scene;
     scene.tree = tree.tree;
     if (!objects.is_none()) {
@@ -207,6 +249,7 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
         refuse_value("material_passes must be empty or have as many entries as materials.");
     for (size_t i = 0; i < material_passes.size(); ++i)
         scene.materials[i].passes = material_passes[i];
+    add_speculars(scene, speculars, sides);
     for (size_t i = 0; i < shapes.size(); ++i)
         scene.shapes.push_back(
             shape_from(shapes[i], numbered("shapes", i), scene, emitters.size()));
@@ -328,6 +371,8 @@ void bind_scene(nb::module_ &m) {
             nb::arg("textures") = nb::list(), nb::arg("material_textures") = nb::none(),
             nb::arg("objects") = nb::none(),
             nb::arg("material_passes") = std::vector<bool>(),
+            nb::arg("speculars") = nb::list(),
+            nb::arg("material_speculars") = SpecularSides(),
             "tree: KdTree over the faces. faces: uint32 (F, 3), or (0, 3) if no shape has "
             "vertex normals or textures. normals: float32 (V, 3) or (0, 3). shapes, "
             "emitters: lists of "
@@ -340,6 +385,8 @@ void bind_scene(nb::module_ &m) {
             "uint32 (M, 3), the texture of front, of back, and of the opacity; 2^32 - 1: "
             "none. objects: Objects beside the tree, or None; shapes cover their faces "
             "too. material_passes: which materials let all light straight through. "
+            "speculars: dicts, fields of the struct; material_speculars: their numbers, of "
+            "front and back, or 2^32 - 1, and whether neither side scatters. "
             "Raises ValueError or TypeError for what does not fit together.");
 }
 

@@ -85,6 +85,7 @@ inline nanobind::dict counters_to_dict(const Counters &counters,
     add("splits", counters.splits);
     add("fallbacks", counters.fallbacks);
     add("blockers", counters.blockers);
+    add("regrouped_rays", counters.regrouped_rays);
     return dict;
 }
 

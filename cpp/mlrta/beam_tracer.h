@@ -21,10 +21,11 @@ public:
     // `camera` has made the rays, if it is given.
     BeamTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
                const CameraMap *camera, Output output, Counters &counters,
-               BeamMemory &memory)
+               BeamMemory &memory, uint32_t regroupings = 0)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
-          packets_(tree, rays, options, output, counters), beam_(memory.beam) {}
+          packets_(tree, rays, options, output, counters), beam_(memory.beam),
+          regroupings_(regroupings) {}
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
@@ -60,12 +61,14 @@ private:
                 trace_beam(first + i, std::min(count - i, SMALL_BEAM), frontier, ordered);
             return;
         }
-        if (beam.any_stray) {
-            set_strays_apart(frontier);
-            return;
+        if (regroupings_ < MOST_REGROUPINGS) {
+            if (beam.any_stray) {
+                set_strays_apart(frontier);
+                return;
+            }
+            if (!camera_ && count <= SMALL_BEAM && regroup(frontier, ordered))
+                return;
         }
-        if (!camera_ && count <= SMALL_BEAM && regroup(frontier, ordered))
-            return;
 
         uint32_t active = 0;
         for (uint32_t n = 0; n < beam.count; ++n)
@@ -92,6 +95,8 @@ private:
         }
         for (uint32_t n = 0; n < beam.count; ++n)
             finish(beam.packets[n], done, frontier);
+        if (beam.any_stray)
+            trace_strays(frontier);
         packets_.flush();
     }
 
@@ -172,12 +177,14 @@ private:
 
     void trace_regrouped(const RayNumbers &numbers, const Frontier &frontier,
                          bool ordered) {
+        counters_.regrouped_rays += numbers.count;
         RegroupedRays part(rays_, numbers);
         const RayGroup group = part.group(rays_);
         typename Output::Buffer buffer;
         Output output = output_.into(buffer);
         output.clear(part.count);
-        BeamTracer(tree_, group, options_, nullptr, output, counters_, memory_)
+        BeamTracer(tree_, group, options_, nullptr, output, counters_, memory_,
+                   regroupings_ + 1)
             .trace_beam(0, part.count, frontier, ordered);
         output_.set(part, buffer);
         part.add_cost_to(rays_);
@@ -195,6 +202,11 @@ private:
     // that too, by the frames of office, conference, sponza and building.
     static constexpr float LARGE_TRIANGLES_PER_RAY = 0.1f;
 
+    // How often a ray is regrouped. Slopes that fall off as powers do are cut one ray at a
+    // time, which would take a beam's rays squared, and as many frames of the stack as it
+    // has rays. Halves take log2(SMALL_BEAM / PACKET_WIDTH) cuts; uneven ones a few more.
+    static constexpr uint32_t MOST_REGROUPINGS = 16;
+
     // What a beam may test before it is given up for packets: rays that are far apart have
     // little in common. Dense scans take about four triangles a ray, where packets are
     // slower still. What a beam has found is lost then, unless any hit will do. Chosen from
@@ -211,7 +223,8 @@ private:
     Counters &counters_;
     BeamMemory &memory_;
     PacketTracer<CommonOrigin, Output> packets_;
-    BeamPackets &beam_; // kept by the memory, since regrouped rays need it no more
+    BeamPackets &beam_;    // kept by the memory, since regrouped rays need it no more
+    uint32_t regroupings_; // that these rays come from
 };
 
 } // namespace mlrt

@@ -24,10 +24,14 @@ void TileRenderer::shade_in_both_ways(const HitPacket &hit,
     for (uint32_t sample = 0; sample < emitter_samples_ && reflecting != 0; ++sample)
         add_weighted_sample(hit, point, reflecting, cos_view, scattering, sample);
     for (uint32_t sample = 0; sample < bsdf_samples_; ++sample) {
-        const BsdfSamples samples = sample_bsdf(
-            scene_, hit, point, lanes, cos_view, scattering,
-            of_rays(hit, samples_.bsdf_x(sample)), of_rays(hit, samples_.bsdf_y(sample)),
-            of_rays(hit, samples_.bsdf_part(sample)));
+        FloatPacket part = of_rays(hit, samples_.bsdf_part(sample));
+        if (scattering.delta != 0)
+            part = select(from_bits<FloatPacket>(scattering.delta),
+                          of_rays(hit, samples_.delta_part(sample)), part);
+        const BsdfSamples samples =
+            sample_bsdf(scene_, hit, point, lanes, cos_view, scattering,
+                        of_rays(hit, samples_.bsdf_x(sample)),
+                        of_rays(hit, samples_.bsdf_y(sample)), part);
         if (samples.lanes != 0)
             bsdf_rays_->append(samples, hit.ray,
                                onward_start(scene_, offset_, hit, point, samples.direction),

@@ -14,7 +14,8 @@
 namespace mlrt {
 
 SampleShares::SampleShares(uint32_t emitter_samples, uint32_t bsdf_samples) {
-    const float sum = float(emitter_samples + bsdf_samples);
+    // Without any sample nothing is shared.
+    const float sum = float(std::max(emitter_samples + bsdf_samples, 1u));
     emitters = float(emitter_samples) / sum;
     bsdfs = float(bsdf_samples) / sum;
     emitter_weight = emitter_samples > 0 ? 1.0f / float(emitter_samples) : 0.0f;

@@ -1,6 +1,7 @@
 #include "render/bsdf_sampling.h"
 
 #include "render/shading_frame.h"
+#include "render/specular.h"
 #include "render/textured_material.h"
 #include "render/unit_disk.h"
 
@@ -9,14 +10,63 @@
 
 namespace mlrt {
 
+namespace {
+
+// Samples of mirrors and glass in the given lanes.
+void add_specular(const PreparedScene &scene, const HitPacket &hit,
+                  const ShadingFrame &frame, LaneBits lanes, const Scattering &scattering,
+                  const FloatPacket &part, BsdfSamples &samples) {
+    const Vec3<FloatPacket> back =
+        hit.direction * (FloatPacket(-1.0f) / length(hit.direction));
+    const LaneArray<float> x = to_lanes<float>(dot(back, frame.s));
+    const LaneArray<float> y = to_lanes<float>(dot(back, frame.t));
+    const LaneArray<float> z = to_lanes<float>(dot(back, frame.n));
+    // What chose to reflect at all is uniform again.
+    const LaneArray<float> choice = to_lanes<float>(part / scattering.opacity);
+    LaneArray<float> local[3] = {}, weight[3] = {};
+    for_each_lane(lanes, [&](uint32_t lane) {
+        const SpecularSample sample =
+            sample_specular(scene.data.speculars[scattering.specular[lane]],
+                            {x[lane], y[lane], z[lane]}, choice[lane]);
+        for (int k = 0; k < 3; ++k) {
+            local[k][lane] = sample.direction[k];
+            weight[k][lane] = sample.weight[k];
+        }
+    });
+    const Vec3<FloatPacket> away =
+        frame.to_world({load<FloatPacket>(local[0]), load<FloatPacket>(local[1]),
+                        load<FloatPacket>(local[2])});
+    const auto mask = from_bits<FloatPacket>(lanes);
+    for (int k = 0; k < 3; ++k) {
+        samples.direction[k] = select(mask, away[k], samples.direction[k]);
+        samples.weight[k] = select(mask, load<FloatPacket>(weight[k]), samples.weight[k]);
+    }
+    samples.lanes |= lanes & not_black(samples.weight);
+}
+
+} // namespace
+
 Scattering scattering_of(const PreparedScene &scene, const HitPacket &hit,
                          const UIntPacket &shapes, LaneBits lanes, LaneBits seen_from_front,
                          const Vec3<FloatPacket> &albedo) {
     Scattering scattering{albedo, FloatPacket(1.0f)};
     for_each_value(shapes, lanes, [&](uint32_t shape, LaneBits holders) {
-        if (scene.shape_materials[shape].passes)
+        const Material &material = scene.shape_materials[shape];
+        if (material.passes)
             scattering.opacity = select(from_bits<FloatPacket>(holders), FloatPacket(0.0f),
                                         scattering.opacity);
+        if (material.delta)
+            scattering.delta |= holders;
+        for (const bool front : {true, false}) {
+            const uint32_t specular =
+                front ? material.front_specular : material.back_specular;
+            if (specular == NONE)
+                continue;
+            const LaneBits side = holders & (front ? seen_from_front : ~seen_from_front);
+            scattering.mirrors |= side;
+            for_each_lane(side,
+                          [&](uint32_t lane) { scattering.specular[lane] = specular; });
+        }
     });
     if (scene.any_material_is_textured)
         add_textures(scene,
@@ -43,9 +93,14 @@ BsdfSamples sample_bsdf(const PreparedScene &scene, const HitPacket &hit,
     samples.direction = hit.direction;
     samples.weight = in_all_lanes({1, 1, 1});
     samples.density = FloatPacket(INFINITY);
-    if (bright == 0)
+    const LaneBits mirrored = reflected & scattering.mirrors & to_bits(cos_view != zero);
+    if ((bright | mirrored) == 0)
         return samples;
     const ShadingFrame frame = shading_frame(scene, hit, point);
+    if (mirrored != 0)
+        add_specular(scene, hit, frame, mirrored, scattering, part, samples);
+    if (bright == 0)
+        return samples;
     const Vec3<FloatPacket> away = frame.to_world({u, v, copy_sign(cosine, cos_view)});
     const auto mask = from_bits<FloatPacket>(bright);
     for (int k = 0; k < 3; ++k) {

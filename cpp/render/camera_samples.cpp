@@ -134,6 +134,17 @@ void CameraSamples::make_room_for_numbers(size_t padded) {
     }
 }
 
+const float *CameraSamples::delta_part(uint32_t sample) const {
+    if (sampler_.type != SamplerType::independent)
+        return bsdf_part(sample);
+    const uint32_t number = 3 * sample + 2, of_lights = 2 * wanted_.light_samples;
+    if (number < of_lights)
+        return number % 2 == 0 ? light_x(number / 2) : light_y(number / 2);
+    const uint32_t rest = number - of_lights;
+    const BsdfNumbers &numbers = bsdf_[rest / 3];
+    return (rest % 3 == 0 ? numbers.x : rest % 3 == 1 ? numbers.y : numbers.part).data();
+}
+
 // Whether the last number that there is of each sample need not be drawn: the second one of
 // a light, which only chooses the light. Other samplers do not draw one number as they do
 // the first of two.

@@ -48,6 +48,9 @@ public:
     const float *bsdf_x(uint32_t sample) const { return bsdf_[sample].x.data(); }
     const float *bsdf_y(uint32_t sample) const { return bsdf_[sample].y.data(); }
     const float *bsdf_part(uint32_t sample) const { return bsdf_[sample].part.data(); }
+    // The one of a material that no light sample is taken of. Mitsuba draws none for it, so
+    // that with the sampler `independent` its numbers are those that come first.
+    const float *delta_part(uint32_t sample) const;
 
 private:
     void lay_out(const PixelGroup &group);

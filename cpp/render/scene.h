@@ -37,10 +37,23 @@ struct Material {
     // that is reflected at all (Mitsuba's `mask`).
     uint32_t front_texture = NONE, back_texture = NONE, opacity = NONE;
     bool passes = false; // all light goes straight through: Mitsuba's `null`
+    // Indices into SceneData::speculars: sides that mirror and refract, and are black else.
+    uint32_t front_specular = NONE, back_specular = NONE;
+    bool delta = false; // neither side scatters, so that no light sample is taken
 
     bool is_textured() const {
         return front_texture != NONE || back_texture != NONE || opacity != NONE;
     }
+};
+
+enum class SpecularType : uint32_t { conductor, dielectric, thindielectric };
+
+// A side of a surface that does not scatter what it mirrors and refracts.
+struct Specular {
+    SpecularType type = SpecularType::conductor;
+    Vec3f reflectance{1, 1, 1}, transmittance{1, 1, 1}; // factors
+    Vec3f eta{}, k{}; // conductor: real and imaginary part of its index, by channel
+    float ior = 1;    // others: index of the inside over that of the outside
 };
 
 enum class EmitterType : uint32_t { point, spot, directional, area, constant, envmap };
@@ -123,6 +136,7 @@ struct SceneData {
                                 // `objects` too
     std::shared_ptr<const ObjectSet> objects; // what is not in the tree; maybe none
     std::vector<Material> materials;
+    std::vector<Specular> speculars;
     std::vector<Texture> textures;
     std::vector<Emitter> emitters;
     EnvironmentPicture environment; // of the emitter that is an envmap

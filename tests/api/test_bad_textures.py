@@ -122,10 +122,11 @@ def test_coordinates_matter_only_where_they_are_used(assets: Path) -> None:
 
 
 @pytest.mark.parametrize("material", ["conductor", "dielectric", "thindielectric"])
-def test_lights_that_bsdf_samples_find_are_left_to_mitsuba(
+def test_lights_in_mirrors_with_textures_are_left_to_mitsuba(
     assets: Path, material: str
 ) -> None:
-    body = mesh("quad.obj", bsdf(material, ""))
+    board = texture("specular_reflectance", "checkerboard", "")
+    body = mesh("quad.obj", bsdf(material, board))
     direct = '<integrator type="direct">{}</integrator>'
     without = direct.format('<integer name="bsdf_samples" value="0"/>')
     paths = {}

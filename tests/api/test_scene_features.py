@@ -149,3 +149,12 @@ def test_third_party_scenes_are_native(
     scene = import_scene(shared_scene(name), resolution=(8, 8))
     assert np.isfinite(scene.vertices).all()
     assert scene.warnings == ()
+
+
+def test_a_summary_serves_once(scene_file: SceneFile) -> None:
+    """Loading changes what was parsed: a second time the image would be another."""
+    path = scene_file(integrator='<integrator type="direct"/>')
+    summary = summarise(path)
+    import_scene(path, summary=summary)
+    with pytest.raises(RuntimeError, match=r"scene\.xml' was loaded .* parse it anew"):
+        import_scene(path, summary=summary)

@@ -18,7 +18,10 @@ from mlrt_plugin.shading_choice import choose_shading
 SceneFile = Callable[..., Path]
 
 SHINY = '<shape type="cube"><bsdf type="plastic" id="shiny"/></shape>'
-GLASS = '<shape type="cube"><bsdf type="dielectric" id="glass"/></shape>'
+GLASS = (
+    '<shape type="cube"><bsdf type="dielectric" id="glass">'
+    '<texture type="checkerboard" name="specular_reflectance"/></bsdf></shape>'
+)
 GLOWING = '<shape type="rectangle"><emitter type="area"/></shape>'
 
 
@@ -49,7 +52,7 @@ def test_native_scenes_stay_native(scene_file: SceneFile) -> None:
                 "shapes": GLASS,
                 "emitters": GLOWING,
             },
-            "lights in bsdf 'dielectric' with id 'glass'.*BSDF samples.*'direct'",
+            "lights in bsdf 'dielectric' with id 'glass'.*BSDF.*'direct'.*with a texture",
         ),
         (
             {"integrator": integrator("mlrt", "integer", "bsdf_samples", 300)},

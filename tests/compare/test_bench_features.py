@@ -12,6 +12,7 @@ from mlrt_compare.bench.features import (
     FEATURES,
     PLAIN,
     FeatureTimes,
+    below_all,
     measure_features,
     prepared_with,
     rows_of,
@@ -30,8 +31,10 @@ def test_pictures_are_the_same() -> None:
 
 
 def test_each_scene_has_its_feature_and_no_other(tmp_path: Path) -> None:
+    cube = below_all(BOX)
+
     def features(content: str) -> set[str]:
-        scene = prepared_with(BOX, content, 8, tmp_path)
+        scene = prepared_with(BOX, content, 8, tmp_path, cube)
         assert isinstance(scene, PreparedScene)
         small, numbers = scene.arrays.shapes[-1], scene.arrays.material_textures
         assert numbers is not None and small.face_count == 12

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mlrt_compare.batch_reference import TILE, batch_reference, tile_means
-from mlrt_compare.bias import bias_test, welch
+from mlrt_compare.bias import ROUNDING, bias_test, welch
 from mlrt_compare.reference_cache import ReferenceCache
 from mlrt_compare.seeds import spread_seeds
 from scipy.stats import ttest_ind
@@ -25,7 +25,7 @@ def renders(generator: np.random.Generator, scale: float = 1.0) -> np.ndarray:
 def test_p_values_are_scipys() -> None:
     generator = np.random.default_rng(SEED)
     first, second = renders(generator), 1.5 * renders(generator)
-    p, noisy, _ = welch(first, second)
+    p, noisy = welch(first, second, np.full(TILES, 1e-6))
     expected = ttest_ind(first, second, axis=0, equal_var=False).pvalue
     assert noisy.all()
     np.testing.assert_allclose(p, expected, rtol=1e-9)
@@ -69,13 +69,72 @@ def test_more_noise_of_one_tile_is_found_there() -> None:
     assert test.variance_ratio == pytest.approx((107 + 16) / 108, rel=0.1)
 
 
+def quiet_renders(generator: np.random.Generator, noise: float) -> np.ndarray:
+    """As `renders`, but that the means of the first row are 1 and their batches have a
+    noise, in units of rounding, that becomes that of the means."""
+    tiles = renders(generator)
+    deviation = noise * ROUNDING * (BATCHES / 2) ** 0.5
+    tiles[:, 0] = generator.normal(1, deviation, (BATCHES, TILES[1]))
+    return tiles
+
+
 def test_tiles_without_noise() -> None:
     same = np.ones((BATCHES, *TILES))
-    assert bias_test(same, same).passed
+    test = bias_test(same, same)
+    assert test.passed and test.quiet_tiles == TILES[0] * TILES[1] and test.tiles == 0
     other = same.copy()
     other[:, 0, 0] = 1.01
     test = bias_test(other, same)
-    assert test.differing_without_noise == 1 and not test.passed
+    assert test.differing_quiet == 1 and not test.passed
+    assert any("1 of 108 tiles with less noise" in reason for reason in test.reasons())
+
+
+def test_less_noise_than_rounding_passes_as_often_as_promised() -> None:
+    """Where noise and rounding are alike, a difference of means is above rounding every
+    few tiles, and says nothing."""
+    print("seed", SEED)
+    generator = np.random.default_rng(SEED)
+    trials, failed, above = 200, 0, 0
+    for _ in range(trials):
+        first, second = (quiet_renders(generator, 0.8) for _ in range(2))
+        test = bias_test(first, second)
+        assert test.quiet_tiles >= TILES[1] / 2
+        failed += test.differing_quiet > 0
+        difference = np.abs(np.mean(first - second, axis=0))[0]
+        above += np.count_nonzero(difference > ROUNDING)
+    assert above > trials, "the case that this is about"
+    # Two in a thousand may fail; with 4 of 200 the chance is below 1e-3.
+    assert failed < 4
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize(
+    "bias",
+    [
+        0.99,  # of energy
+        0.5,  # one light of two
+        1 + 8 * ROUNDING,
+    ],
+)
+def test_a_bias_of_a_quiet_tile_is_found(noise: float, bias: float) -> None:
+    generator = np.random.default_rng(SEED)
+    first, second = (quiet_renders(generator, noise) for _ in range(2))
+    assert bias_test(first, second).differing_quiet == 0
+    first[:, 0, 3] *= bias
+    test = bias_test(first, second)
+    assert test.differing_quiet == 1 and not test.passed
+
+
+def test_a_rounding_of_a_bright_tile_is_none() -> None:
+    """A lamp in view, as single precision holds it and as its next number."""
+    dim = np.full((BATCHES, *TILES), 0.01)
+    first, second = dim.copy(), dim.copy()
+    first[:, 2, 2] = np.float32(40)
+    second[:, 2, 2] = np.nextafter(np.float32(40), np.float32(41))
+    assert abs(first[0, 2, 2] - second[0, 2, 2]) > ROUNDING * second[0].mean()
+    assert bias_test(first, second).passed
+    second[:, 2, 2] *= 1 + 4 * ROUNDING
+    assert not bias_test(first, second).passed
 
 
 def test_tile_means_by_hand() -> None:

@@ -90,6 +90,64 @@ def test_a_wrong_image_is_no_speed_up(tmp_path: Path, how: str, said: str) -> No
     assert "**FAIL: " in child.stdout and said in child.stdout
 
 
+COINCIDENT = """<scene version="3.0.0">
+    <integrator type="direct">
+        <integer name="emitter_samples" value="1"/>
+        <integer name="bsdf_samples" value="0"/>
+    </integrator>
+    <default name="spp" value="1"/> <default name="resx" value="48"/>
+    <default name="resy" value="48"/>
+    <sensor type="perspective">
+        <float name="fov" value="60"/>
+        <transform name="to_world">
+            <lookat origin="0.3, -0.7, 3.1" target="0, 0, 0" up="0, 1, 0"/>
+        </transform>
+        <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
+        <film type="hdrfilm">
+            <integer name="width" value="$resx"/> <integer name="height" value="$resy"/>
+            <rfilter type="box"/>
+        </film>
+    </sensor>
+    <emitter type="point">
+        <point name="position" x="1" y="2" z="4"/> <rgb name="intensity" value="30"/>
+    </emitter>
+    <emitter type="point">
+        <point name="position" x="-1" y="0" z="2"/> <rgb name="intensity" value="9"/>
+    </emitter>
+    <shape type="rectangle">
+        <transform name="to_world"><scale value="3"/></transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf>
+    </shape>
+    <shape type="rectangle">
+        <transform name="to_world">
+            <scale value="0.3"/> <rotate z="1" angle="20"/> <translate x="0.9" y="0.8"/>
+        </transform>
+        <bsdf type="diffuse"><rgb name="reflectance" value="0.7"/></bsdf>
+    </shape>
+</scene>
+"""
+
+
+def test_faces_in_the_same_plane_stand_apart(tmp_path: Path, cache: Path) -> None:
+    """Of two faces that are equally near, MLRT takes the first, Embree the one whose
+    distance happens to be rounded down."""
+    scene = tmp_path / "coincident.xml"
+    scene.write_text(COINCIDENT)
+    child = python(
+        *("-m", "mlrt_compare", "speed-error", scene, "--spp", "1,2,4", "--rounds", "4"),
+        *("--reference-factor", "256", "--cache", cache, "-o", tmp_path / "out"),
+    )
+    told = json.loads((tmp_path / "out" / "coincident-speed-error.json").read_text())
+    assert not told["bias"]["passed"], child.stdout
+    disputed = told["disputed_tiles"]
+    assert disputed["reasons"] == [] and 1 <= disputed["tiles"] <= 4
+    assert disputed["others"]["tiles"] + disputed["others"]["quiet_tiles"] >= 5
+    judged = disputed["judgement"]
+    assert judged["rays"] == judged["both_right"] > 100
+    assert f"Without the {disputed['tiles']} tiles of such rays, the others" in child.stdout
+    assert not {*told["bias"]["reasons"]} & {*told["reasons"]}
+
+
 def test_a_missing_scene_is_one_sentence(tmp_path: Path) -> None:
     child = python("-m", "mlrt_compare", "speed-error", "none.xml", "-o", tmp_path)
     lines = child.stderr.splitlines()

@@ -75,24 +75,38 @@ def with_shape(scene: Path, place: Sequence[float], size: float, content: str) -
     return text[:end] + cube + text[end:]
 
 
-def prepared_with(scene: Path, content: str, resolution: int, folder: Path) -> Any:
-    """A scene with the small cube, below everything else and out of sight.
+def below_all(scene: Path) -> tuple[list[float], float]:
+    """Where a small cube is below everything else of a scene and out of sight, and half
+    its side.
 
-    Raises BenchError if it cannot be loaded, or is not shaded natively.
+    Raises BenchError if the scene cannot be loaded, or is not shaded natively.
     """
-    size = (resolution, resolution)
     try:
-        plain = prepare(scene, resolution=size)
-        if plain.shading.path != "native":
-            raise BenchError(f"{scene} is not shaded natively: {plain.shading.reason}")
-        low, high = (np.array(corner) for corner in plain.tree.bounds)
-        extent = float(np.max(high - low))
-        below = (low + high) / 2
-        below[1] = low[1] - 1e-4 * extent
-        path = folder / scene.name
-        path.write_text(with_shape(scene, below, 1e-5 * extent, content))
+        plain = prepare(scene, resolution=(1, 1))
+    except MlrtError as error:
+        raise BenchError(str(error)) from error
+    if plain.shading.path != "native":
+        raise BenchError(f"{scene} is not shaded natively: {plain.shading.reason}")
+    low, high = (np.array(corner) for corner in plain.tree.bounds)
+    extent = float(np.max(high - low))
+    middle = (low + high) / 2
+    return [middle[0], low[1] - 1e-4 * extent, middle[2]], 1e-5 * extent
+
+
+def prepared_with(
+    scene: Path,
+    content: str,
+    resolution: int,
+    folder: Path,
+    cube: tuple[Sequence[float], float],
+) -> Any:
+    """A scene with a small cube of that place and size; raises BenchError if it cannot be
+    loaded."""
+    path = folder / scene.name
+    path.write_text(with_shape(scene, *cube, content))
+    try:
         with resolving_from(scene.parent.resolve()):
-            return prepare(path, resolution=size)
+            return prepare(path, resolution=(resolution, resolution))
     except MlrtError as error:
         raise BenchError(str(error)) from error
 
@@ -101,9 +115,10 @@ def measure_features(
     scene: Path, resolution: int, spp: int, rounds: int
 ) -> list[FeatureTimes]:
     """Frames of a scene with each feature, in turns; the first are those without any."""
+    cube = below_all(scene)
     with tempfile.TemporaryDirectory() as folder:
         prepared = [
-            prepared_with(scene, content, resolution, Path(folder))
+            prepared_with(scene, content, resolution, Path(folder), cube)
             for content in FEATURES.values()
         ]
 

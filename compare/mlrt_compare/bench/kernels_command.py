@@ -143,7 +143,6 @@ def markdown(figures: dict[str, Any]) -> str:
         "",
         *summary_lines(figures),
         "",
-        "",
         *machine_lines(figures["machine"]),
     ]
     for scene in figures["scenes"]:
