@@ -81,6 +81,7 @@ public:
         tree_.widening->miss(uint64_t(std::popcount(lanes)));
         trace_lanes(first, lanes, frontier);
     }
+    bool knows_wide_tree() const { return alone_.has_value(); }
     void flush() {
         if (alone_)
             alone_->flush();

@@ -11,8 +11,7 @@ namespace mlrt {
 
 namespace {
 
-bool may_be_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptions &options) {
-    // In the wide tree rays share nothing.
+bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
     return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
@@ -69,7 +68,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(tree, rays, options))
+    if (may_be_sorted(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -90,7 +89,7 @@ void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(tree, rays, options))
+    if (may_be_sorted(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_any(tree, rays, options, occluded, counters);

@@ -79,6 +79,7 @@ class RayBenchmark:
             show_status(f"{scene.name}: building")
             self._mesh = self._module.Mesh(scene.vertices, scene.faces)
             self._tree = self._module.KdTree(self._mesh, {"builder": "auto"})
+            self._tree.widen()
             # Rays are traced by threads of our own, however many Embree builds with.
             self._device = embree_device(self._module, most)
             self._embree = {
@@ -91,6 +92,7 @@ class RayBenchmark:
             if self._inexact is not None:
                 mesh = self._inexact.Mesh(scene.vertices, scene.faces)
                 self._inexact_tree = self._inexact.KdTree(mesh, {"builder": "auto"})
+                self._inexact_tree.widen()
         self._image = np.zeros((side, side), np.float32)
 
     def facts(self) -> dict[str, Any]:
