@@ -112,7 +112,12 @@ def test_a_small_stack_is_enough() -> None:
     )
     hard = resource.getrlimit(resource.RLIMIT_STACK)[1]
     child = subprocess.run(
-        [sys.executable, "-c", code],
+        [
+            sys.executable,
+            "-P",
+            "-c",
+            code,
+        ],  # the package that is tested here, not its sources
         capture_output=True,
         text=True,
         timeout=120,
