@@ -1,7 +1,8 @@
 """What a bias is worth that comes from intersections: where two faces are equally near, or
 one renderer misses a face, images differ however the light is computed.
 
-If a bias test fails, the tiles that have such pixels stand apart, and three judges see the
+If a bias test fails, the tiles that have such pixels, or pixels of samples that rounding
+decides, stand apart, and three judges see the
 whole image between them: the bias test all other tiles, exact arithmetic the rays that both
 sides answer in another way, and equal samples the pixels around those, which must agree to
 rounding.

@@ -85,7 +85,7 @@ def parity(settings: Settings) -> Parity:
 def parity_and_pixels_apart(settings: Settings) -> tuple[Parity, Mask]:
     """Renders a scene by MLRT, by Mitsuba, and by the twin that tells which rays differ.
 
-    Returns (H, W) too which pixels are disputed or rounded.
+    Returns also, (H, W), which pixels are disputed or decided by rounding.
 
     `settings.shading` chooses the path. Raises MlrtError if it cannot be rendered,
     and CannotRun for too many samples.

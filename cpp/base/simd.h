@@ -356,13 +356,13 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
 
 inline constexpr size_t CACHE_LINE = 64;
 
-// Asks for the cache lines of an object that will be read soon: one, if objects of its size
-// fill lines.
+// Asks for the cache lines of an object that will be read soon.
 template <typename Object>
 void prefetch(const Object *object) {
     const char *bytes = reinterpret_cast<const char *>(object);
-    __builtin_prefetch(bytes);
-    if constexpr (CACHE_LINE % sizeof(Object) != 0)
+    for (size_t at = 0; at < sizeof(Object); at += CACHE_LINE)
+        __builtin_prefetch(bytes + at);
+    if constexpr (CACHE_LINE % sizeof(Object) != 0 && alignof(Object) < CACHE_LINE)
         __builtin_prefetch(bytes + sizeof(Object) - 1);
 }
 

@@ -4,6 +4,7 @@
 #include "bind/fields.h"
 #include "bind/mesh_arrays.h"
 #include "bind/objects_handle.h"
+#include "bind/prepare_tree.h"
 #include "bind/ray_arrays.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
@@ -174,6 +175,7 @@ nb::tuple closest_hit(const ObjectsHandle &self, const TreeHandle &tree,
     const TraceOptions trace_options = trace_options_from(options);
     const ObjectSet &objects = *self.objects;
     const RayArrays rays(origins, directions, t_min, t_max);
+    prepare_tree(*tree.tree, rays, trace_options);
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> face(rays.count()), instance(rays.count());
     rays.for_each_group(
@@ -205,6 +207,7 @@ nb::object any_hit(const ObjectsHandle &self, const TreeHandle &tree, const Poin
                    const nb::dict &options) {
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
+    prepare_tree(*tree.tree, rays, trace_options);
     std::vector<uint8_t> occluded(rays.count());
     rays.for_each_group(unordered_group_size(trace_options, rays.count()),
                         [&](size_t first, const RayGroup &group, Counters &counters) {

@@ -5,6 +5,7 @@
 #include "bind/bind.h"
 #include "bind/build_options.h"
 #include "bind/mesh_arrays.h"
+#include "bind/prepare_tree.h"
 #include "bind/ray_arrays.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
@@ -40,22 +41,12 @@ TreeHandle build(const Points &vertices, const Faces &faces, const nb::kwargs &o
             build_options};
 }
 
-// The wide tree is there for those that ask for it, or if it is worth making. It stays away
-// from rays that all start in one point, as those of cameras and lamps do.
-void prepare(const KdTree &tree, const RayArrays &rays, const TraceOptions &options) {
-    const nb::gil_scoped_release release;
-    if (options.traversal == Traversal::wide)
-        tree.widening->make(tree);
-    else if (options.traversal == Traversal::adaptive)
-        tree.widening->make_for(tree, rays.have_common_origin() ? 0 : rays.count());
-}
-
 nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
                       const Points &directions, const Values &t_min, const Values &t_max,
                       const nb::dict &options, const nb::object &counters_out) {
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
-    prepare(*self.tree, rays, trace_options);
+    prepare_tree(*self.tree, rays, trace_options);
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> primitive(rays.count());
     const Counters counters = rays.for_each_group(
@@ -84,7 +75,7 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
                    const nb::object &counters_out) {
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
-    prepare(*self.tree, rays, trace_options);
+    prepare_tree(*self.tree, rays, trace_options);
     std::vector<uint8_t> occluded(rays.count());
     const Counters counters =
         rays.for_each_group(unordered_group_size(trace_options, rays.count()),

@@ -1,5 +1,7 @@
 #include "kdtree/wide_maker.h"
 
+#include "base/check.h"
+#include "base/denormals.h"
 #include "base/parallel.h"
 #include "geometry/clip.h"
 #include "kdtree/lazy.h"
@@ -136,6 +138,8 @@ public:
             const uint64_t place = arrays_.nodes.take(nodes_);
             arrays_.nodes[place] = part.node();
             part.become(WideChild::node(place));
+            ++part.depth;
+            MLRT_CHECK(part.depth <= MAX_WIDE_DEPTH);
         }
         return part.children[0];
     }
@@ -298,6 +302,7 @@ private:
 } // namespace
 
 WideTree make_wide_tree(const KdTree &tree) {
+    const KeepDenormals keep_denormals;
     finish_growth(tree);
     const uint64_t references =
         tree.growth ? tree.growth->state().references : tree.references.size();

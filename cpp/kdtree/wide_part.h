@@ -13,7 +13,8 @@
 namespace mlrt {
 
 struct WidePart {
-    Box3f box; // of all
+    Box3f box;          // of all
+    uint32_t depth = 0; // nodes on the longest path below
 
     // Triangles, without repeats, as long as there are no children.
     uint32_t triangle_count = 0;
@@ -63,6 +64,7 @@ struct WidePart {
         std::copy_n(upper.children.begin(), upper.child_count,
                     children.begin() + child_count);
         child_count += upper.child_count;
+        depth = std::max(depth, upper.depth);
         add_bounds(box, upper.box);
     }
 

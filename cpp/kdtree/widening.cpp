@@ -3,13 +3,16 @@
 #include "kdtree/tree.h"
 #include "kdtree/wide_maker.h"
 
+#include <new>
+#include <stdexcept>
+
 namespace mlrt {
 
 namespace {
 
-// For as many rays a reference of the kd-tree as this, what the wide tree saves is what it
-// takes to make it, on office, conference, sponza and dragon. To wait for so many never
-// costs more than twice what the best choice does.
+// Rays for each reference of the kd-tree whose saving is what the wide tree takes to make,
+// on office, conference, sponza and dragon. To wait for so many never costs more than twice
+// what the best choice does.
 constexpr double RAYS_PER_REFERENCE = 2;
 
 } // namespace
@@ -25,11 +28,20 @@ const WideTree &Widening::make(const KdTree &tree) {
 
 void Widening::make_for(const KdTree &tree, uint64_t rays) {
     // A lazy tree is wanted for what is not built.
-    if (this->tree() || tree.growth)
+    if (this->tree() || tree.growth || has_no_room_)
         return;
     const uint64_t expected = missed_.load(std::memory_order_relaxed) + rays;
-    if (double(expected) >= RAYS_PER_REFERENCE * double(tree.references.size()))
+    const double enough = RAYS_PER_REFERENCE * double(tree.references.size());
+    if (double(expected) < enough)
+        return;
+    // Rays find the same hits without it.
+    try {
         make(tree);
+    } catch (const std::bad_alloc &) {
+        has_no_room_ = true;
+    } catch (const std::length_error &) {
+        has_no_room_ = true;
+    }
 }
 
 } // namespace mlrt

@@ -25,12 +25,13 @@ public:
     const WideTree &make(const KdTree &tree);
 
     // The same if `rays` that are about to be traced, and those that have missed it, are
-    // worth it. Lazy trees are left as they are.
+    // worth it, and there is room. Lazy trees are left as they are.
     void make_for(const KdTree &tree, uint64_t rays);
 
 private:
     std::atomic<const WideTree *> tree_{nullptr};
     std::atomic<uint64_t> missed_{0};
+    std::atomic<bool> has_no_room_{false};
     std::unique_ptr<const WideTree> owned_;
     std::mutex mutex_;
 };

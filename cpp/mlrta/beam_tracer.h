@@ -97,11 +97,7 @@ private:
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)
                 cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
-        if (!done) {
-            ++counters_.fallbacks;
-            counters_.rays -= active;
-            counters_.packets -= beam.count;
-        }
+        counters_.fallbacks += !done;
         for (uint32_t n = 0; n < beam.count; ++n)
             finish(beam.packets[n], done, frontier);
         if (beam.any_stray)
@@ -122,8 +118,12 @@ private:
             else
                 output_.set(packet.first_ray, packet.found, packet.primitive);
         }
-        if (left != 0)
-            packets_.trace_stray(packet.first_ray, left, frontier);
+        if (left == 0)
+            return;
+        // Those that trace them count them too.
+        counters_.rays -= uint64_t(std::popcount(left));
+        --counters_.packets;
+        packets_.trace_stray(packet.first_ray, left, frontier);
     }
 
     FloatPacket distances_of(const BeamPacket &packet) {

@@ -84,11 +84,11 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
         fused(quotient, fused(-denominator, rough, DoublePacket(1.0)), quotient);
     const DoublePacket error =
         t * to_double(fused(denominator_share, relative_size, share));
-    // Not equal if anything is NaN.
+    // Not equal if anything is NaN. A relative size that underflows bounds nothing.
     const FloatPacket rounded(t + error);
-    const auto certain = (FloatPacket(t - error) == rounded) &
-                         (absolute(size) >= SMALLEST_DENOMINATOR) &
-                         (absolute(size) <= LARGEST_DENOMINATOR);
+    const auto certain =
+        (FloatPacket(t - error) == rounded) & (relative_size >= 0x1p-126f) &
+        (absolute(size) >= SMALLEST_DENOMINATOR) & (absolute(size) <= LARGEST_DENOMINATOR);
     const LaneBits open = lanes & ~to_bits(certain);
     if (open == 0)
         return rounded;

@@ -36,7 +36,7 @@ public:
         : tree_(tree), rays_(rays), options_(options), output_(output),
           counters_(counters) {
         if (const WideTree *wide = wide_tree_for(tree, options))
-            alone_.emplace(tree, *wide, rays, output, counters);
+            wide_.emplace(tree, *wide, rays, output, counters);
     }
 
     // Traces a run of rays.
@@ -72,19 +72,19 @@ public:
     }
 
     // The same for lanes that a beam is no good for, through the wide tree if it is there:
-    // then flush() waits for their answers.
+    // then flush() answers them.
     void trace_stray(uint32_t first, LaneBits lanes, const Frontier &frontier) {
-        if (alone_) {
-            alone_->add(first, lanes);
+        if (wide_) {
+            wide_->add(first, lanes);
             return;
         }
         tree_.widening->miss(uint64_t(std::popcount(lanes)));
         trace_lanes(first, lanes, frontier);
     }
-    bool knows_wide_tree() const { return alone_.has_value(); }
+    bool knows_wide_tree() const { return wide_.has_value(); }
     void flush() {
-        if (alone_)
-            alone_->flush();
+        if (wide_)
+            wide_->flush();
     }
 
 private:
@@ -94,7 +94,7 @@ private:
     }
 
     void trace_either_way(uint32_t first, uint32_t count, const Frontier &frontier) {
-        if (!alone_)
+        if (!wide_)
             tree_.widening->miss(count);
         for (uint32_t done = 0; done < count; done += PacketsOrSingles::RAYS) {
             const uint32_t rays = std::min(count - done, PacketsOrSingles::RAYS);
@@ -104,7 +104,7 @@ private:
                 trace_singles(first + done, rays, frontier);
             else
                 trace_packets(first + done, rays, frontier);
-            tactics_.learn(singles ? (alone_ ? Way::wide : Way::single) : Way::packet,
+            tactics_.learn(singles ? (wide_ ? Way::wide : Way::single) : Way::packet,
                            before, counters_);
         }
     }
@@ -178,22 +178,9 @@ private:
         }
     }
 
-    Ray ray_of(uint32_t i) const {
-        Ray ray;
-        ray.origin = rays_.common_origin;
-        for (int k = 0; k < 3; ++k) {
-            if constexpr (std::is_same_v<Origin, LaneOrigins>)
-                ray.origin[k] = rays_.origin[k][i];
-            ray.direction[k] = rays_.direction[k][i];
-        }
-        ray.t_min = std::max(rays_.t_min[i], 0.0f);
-        ray.t_max = rays_.t_max[i];
-        return ray;
-    }
-
     // By X1.
     void trace_ray(uint32_t i, const Frontier &frontier) {
-        const Ray ray = ray_of(i);
+        const Ray ray = ray_of(rays_, i);
         Hit hit;
         if (options_.traversal == Traversal::brute_force)
             hit = brute_force(tree_, ray, Output::query, counters_);
@@ -204,8 +191,8 @@ private:
 
     // Traces a run of rays through the wide tree, or by X1.
     void trace_singles(uint32_t first, uint32_t count, const Frontier &frontier) {
-        if (alone_) {
-            alone_->trace(first, count);
+        if (wide_) {
+            wide_->trace(first, count);
             return;
         }
         constexpr uint32_t MOST = 64;
@@ -227,7 +214,7 @@ private:
                     lanes &= ~stopped_again(packet, first + done);
                 for_each_lane(lanes, [&](uint32_t lane) {
                     numbers[active] = first + done + lane;
-                    rays[active] = ray_of(numbers[active]);
+                    rays[active] = ray_of(rays_, numbers[active]);
                     ++active;
                 });
             }
@@ -267,7 +254,7 @@ private:
     Output output_;
     Counters &counters_;
     PacketsOrSingles tactics_;
-    std::optional<WideTracer<Origin, Output>> alone_;
+    std::optional<WideTracer<Origin, Output>> wide_;
     uint32_t occluder_ = NO_PRIMITIVE; // that stopped rays, of Query::any
 };
 

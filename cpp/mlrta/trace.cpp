@@ -97,9 +97,29 @@ private:
     double greatest_t_min_ = 0, greatest_t_max_ = 0; // of all rays, for camera tiles
 };
 
+// Whether coordinates are so large that only rays one by one are safe from overflow, as
+// they are scaled.
+bool is_huge(const KdTree &tree, const RayGroup &rays) {
+    const auto reaches = [](Vec3f v) {
+        return max_component(abs(v)) >= LARGEST_COORDINATE;
+    };
+    return reaches(tree.bounds.lo) || reaches(tree.bounds.hi) ||
+           (rays.has_common_origin && reaches(rays.common_origin));
+}
+
+// How rays are traced: as is asked for, unless that is not safe.
+TraceOptions safe_options(const KdTree &tree, const RayGroup &rays, TraceOptions options) {
+    if (options.traversal != Traversal::brute_force && is_huge(tree, rays)) {
+        options.traversal = Traversal::single;
+        options.entry_points = false;
+    }
+    return options;
+}
+
 template <typename Output>
-void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &asked,
                  const CameraTile *tile, Output output, Counters &counters) {
+    const TraceOptions options = safe_options(tree, rays, asked);
     const auto trace_runs = [&](auto runs) {
         TileTracer(tree, rays, options, tile, runs, counters).trace();
     };

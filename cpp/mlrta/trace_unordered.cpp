@@ -1,7 +1,6 @@
 #include "mlrta/trace_unordered.h"
 
 #include "mlrta/ray_order.h"
-#include "mlrta/wide_tracer.h"
 
 #include <algorithm>
 #include <optional>

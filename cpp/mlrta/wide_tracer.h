@@ -42,11 +42,13 @@ public:
     }
 
     // Traces those of sixteen rays from `first` on whose bit is set, now or with the next
-    // ones: flush() waits for them.
+    // ones: all are answered after flush().
     void add(uint32_t first, LaneBits lanes) {
         auto [packet, extreme] = load_packet<Origin>(rays_, first);
         LaneBits active = packet.active & lanes;
-        counters_.rays += uint64_t(std::popcount((packet.active | extreme) & lanes));
+        const LaneBits traced = (packet.active | extreme) & lanes;
+        counters_.rays += uint64_t(std::popcount(traced));
+        counters_.packets += traced != 0;
         for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
         if (active != 0)
             active &= ~stopped_again(packet, active, first);
@@ -78,18 +80,9 @@ public:
 private:
     // By X1.
     void trace_extreme(uint32_t i) {
-        Ray ray;
-        ray.origin = rays_.common_origin;
-        for (int k = 0; k < 3; ++k) {
-            if constexpr (std::is_same_v<Origin, LaneOrigins>)
-                ray.origin[k] = rays_.origin[k][i];
-            ray.direction[k] = rays_.direction[k][i];
-        }
-        ray.t_min = std::max(rays_.t_min[i], 0.0f);
-        ray.t_max = rays_.t_max[i];
         RayCost cost(rays_, counters_);
-        output_.set(i,
-                    trace_single(tree_, ray, Output::query, root_entry(tree_), counters_));
+        output_.set(i, trace_single(tree_, ray_of(rays_, i), Output::query,
+                                    root_entry(tree_), counters_));
         cost.add_to_run(i, 1);
     }
 

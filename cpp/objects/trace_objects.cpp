@@ -108,13 +108,7 @@ private:
 
 // The ray, with an empty interval if it is inactive.
 Ray ray_at(const RayGroup &rays, uint32_t i) {
-    Ray ray;
-    for (int k = 0; k < 3; ++k) {
-        ray.origin[k] = rays.has_common_origin ? rays.common_origin[k] : rays.origin[k][i];
-        ray.direction[k] = rays.direction[k][i];
-    }
-    ray.t_min = std::max(rays.t_min[i], 0.0f);
-    ray.t_max = rays.t_max[i];
+    Ray ray = ray_of(rays, i);
     if (!is_finite(ray.origin) || !is_finite(ray.direction) ||
         max_component(abs(ray.direction)) == 0)
         ray.t_max = 0;

@@ -6,8 +6,12 @@
 
 namespace mlrt {
 
-// A packet, and the lanes that need a traversal of their own because a direction component
-// is so large or small that intersecting planes in single precision could lose it.
+// Differences of coordinates that are less do not overflow in single precision.
+inline constexpr float LARGEST_COORDINATE = 0x1p125f;
+
+// A packet, and the lanes that need a traversal of their own because an origin lies so far
+// away, or a direction component is so large or small, that intersecting planes in single
+// precision could lose it.
 template <typename Origin>
 struct LoadedPacket {
     RayPacket<Origin> rays;
@@ -33,6 +37,7 @@ LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
     rays.t_min = maximum(FloatPacket(0.0f), load_padded(group.t_min, first, group.count));
     rays.t_max = load_padded(group.t_max, first, group.count);
     auto active = rays.t_min < rays.t_max;
+    MaskOf<FloatPacket> far_away = false;
     if constexpr (std::is_same_v<Origin, CommonOrigin>) {
         rays.origin.point = group.common_origin;
         active &= MaskOf<FloatPacket>(is_finite(group.common_origin));
@@ -40,6 +45,7 @@ LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
         for (int k = 0; k < 3; ++k) {
             rays.origin.point[k] = load_padded(group.origin[k], first, group.count);
             active &= absolute(rays.origin.point[k]) < INFINITY;
+            far_away |= absolute(rays.origin.point[k]) >= LARGEST_COORDINATE;
         }
     }
     FloatPacket largest = 0.0f;
@@ -55,7 +61,7 @@ LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
     }
     active &= largest > 0.0f;
     rays.active = to_bits(active);
-    loaded.extreme = to_bits(small_component | (largest < SMALLEST_DIRECTION) |
+    loaded.extreme = to_bits(far_away | small_component | (largest < SMALLEST_DIRECTION) |
                              (largest > LARGEST_DIRECTION)) &
                      rays.active;
     rays.active &= ~loaded.extreme;

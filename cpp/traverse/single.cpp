@@ -182,6 +182,17 @@ private:
 
 } // namespace
 
+Ray ray_of(const RayGroup &rays, uint32_t i) {
+    Ray ray;
+    for (int k = 0; k < 3; ++k) {
+        ray.origin[k] = rays.has_common_origin ? rays.common_origin[k] : rays.origin[k][i];
+        ray.direction[k] = rays.direction[k][i];
+    }
+    ray.t_min = std::max(rays.t_min[i], 0.0f);
+    ray.t_max = rays.t_max[i];
+    return ray;
+}
+
 Hit brute_force(const KdTree &tree, const Ray &ray, Query query, Counters &counters) {
     Hit best{ray.t_max, NO_PRIMITIVE};
     for (uint32_t primitive = 0; primitive < tree.triangles.size(); ++primitive) {

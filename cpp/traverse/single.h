@@ -3,6 +3,7 @@
 
 #include "base/counters.h"
 #include "traverse/query.h"
+#include "traverse/ray_group.h"
 
 #include <limits>
 #include <span>
@@ -16,6 +17,9 @@ struct Ray {
     float t_min = 0;
     float t_max = std::numeric_limits<float>::infinity();
 };
+
+// A ray of a group, which may be inactive.
+Ray ray_of(const RayGroup &rays, uint32_t i);
 
 // Infinity and NO_PRIMITIVE for a miss. A query for any hit reports the first one it finds.
 struct Hit {

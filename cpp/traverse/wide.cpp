@@ -111,13 +111,6 @@ private:
     // ParameterInterval: a denormal t is off by more than that share.
     static float latest_parameter(float t) { return t + SMALLEST_FLOAT; }
 
-    template <typename Object>
-    static void prefetch(const Object *object) {
-        const char *bytes = reinterpret_cast<const char *>(object);
-        for (size_t at = 0; at < sizeof(Object); at += CACHE_LINE)
-            mlrt::prefetch(bytes + at);
-    }
-
     void test(const Triangle &triangle, uint32_t primitive, bool certainly_hit,
               Counters &counters) {
         if (!certainly_hit) {

@@ -5,7 +5,9 @@
 #include "geometry/ray_packet.h"
 
 #include <array>
+#include <bit>
 #include <cstdint>
+#include <type_traits>
 
 namespace mlrt {
 

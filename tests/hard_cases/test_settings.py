@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
-import ctypes.util
 import itertools
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 import workloads
+from denormals import denormals_flushed
 from hard_cases.case import SEED, covers
 from hard_cases.running import WAYS
 from kd_trees import BUILDERS
@@ -21,21 +18,6 @@ from tracing import build, closest, each_core
 from mlrt_plugin import KdTree
 from mlrt_plugin._dispatch import core
 from mlrt_plugin.threads import thread_count
-
-
-@contextmanager
-def denormals_flushed() -> Iterator[None]:
-    """Sets FTZ and DAZ of this thread, bits 15 and 6 of the MXCSR, which glibc keeps at the
-    end of the 32 bytes of its fenv_t."""
-    libm = ctypes.CDLL(ctypes.util.find_library("m"))
-    before = (ctypes.c_uint32 * 8)()
-    assert libm.fegetenv(before) == 0
-    flushing = (ctypes.c_uint32 * 8)(*before[:7], before[7] | 0x8040)
-    assert libm.fesetenv(flushing) == 0
-    try:
-        yield
-    finally:
-        assert libm.fesetenv(before) == 0
 
 
 def small_scene() -> workloads.Scene:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from fractions import Fraction
 
@@ -10,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
+from denormals import denormals_flushed
 from kd_trees import each_builder
 
 import mlrt_plugin
@@ -179,3 +183,52 @@ def test_rays_with_a_common_origin_leave_it_alone() -> None:
     assert tree.report["wide_bytes"] == 0
     bytes_of_it = tree.widen()
     assert tree.report["wide_bytes"] == bytes_of_it > 0
+
+
+def test_denormal_numbers_count_when_it_is_made() -> None:
+    """Whatever mode the thread that asks for it is in."""
+    rng = np.random.default_rng(SEED)
+    vertices, faces = workloads.sphere(3)
+    tiny = np.float32(vertices * 2.0**-136)
+    origins = np.float32(rng.uniform(-0.3, 0.3, (2000, 3)) * 2.0**-136)
+    directions = np.float32(rng.normal(size=(2000, 3)))
+    tree = mlrt_plugin.KdTree(tiny, faces)
+    with denormals_flushed():
+        flushed = np.float32(2.0**-149) * np.ones(1, np.float32)
+        tree.widen()
+    assert flushed[0] == 0, "denormal numbers were not flushed"
+    expected = tree.closest_hit(origins, directions, traversal="brute_force")
+    found = tree.closest_hit(origins, directions, traversal="wide")
+    assert (expected.primitive >= 0).all()
+    np.testing.assert_array_equal(found.primitive, expected.primitive)
+    np.testing.assert_array_equal(found.t, expected.t)
+
+
+def test_rays_are_traced_without_it_if_there_is_no_room() -> None:
+    code = (
+        "import resource, numpy as np, mlrt_plugin\n"
+        "import workloads\n"
+        "tree = mlrt_plugin.KdTree(*workloads.sphere(8))\n"
+        "origins = np.random.default_rng(1).uniform(-0.5, 0.5, (2000, 3))\n"
+        "origins = origins.astype(np.float32)\n"
+        "many = np.tile(origins, (800, 1))\n"
+        "tree.any_hit(origins[:10], origins[:10])\n"
+        "with open('/proc/self/statm') as file:\n"
+        "    used = int(file.read().split()[0]) * resource.getpagesize()\n"
+        "limit = used + (300 << 20)\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (limit, -1))\n"
+        "assert len(many) >= 2 * tree.report['references'], tree.report['references']\n"
+        "hit = tree.any_hit(many, many[::-1]), tree.any_hit(many, many[::-1])\n"
+        "assert tree.report['wide_bytes'] == 0\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (-1, -1))\n"
+        "print(np.mean(hit))\n"
+    )
+    child = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    assert child.returncode == 0, child.stderr
+    assert child.stdout.strip() == "1.0"

@@ -310,3 +310,25 @@ def test_surfaces_that_lie_in_one_plane(core: ModuleType) -> None:
     counters: dict[str, int] = {}
     tree.closest_hit(*rays, *interval(rays, 0, np.inf), BEAM_LEAF, counters)
     assert counters["double_tests"] > 1000, SEED
+
+
+@each_core
+def test_each_ray_is_counted_once_where_beams_are_given_up(core: ModuleType) -> None:
+    """Half of the rays end at a wall, the others in a dense cloud behind it."""
+    count = 100_000
+    rng = np.random.default_rng(SEED)
+    corners = rng.uniform(-1, 1, (count, 1, 3)) + rng.uniform(-0.02, 0.02, (count, 3, 3))
+    corners += [0, 0, 10]
+    wall = [[-9, -9, 5], [0, -9, 5], [-9, 9, 5]], [[0, -9, 5], [0, 9, 5], [-9, 9, 5]]
+    vertices = np.float32(np.concatenate([corners, wall]).reshape(-1, 3))
+    tree = build(core, (vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)))
+    directions = np.ones((256, 3), np.float32)
+    directions[:, :2] = rng.uniform(-0.08, 0.08, (256, 2))
+    rays = np.zeros_like(directions), directions
+    for query in (tree.closest_hit, tree.any_hit):
+        for _ in range(2):
+            counters: dict[str, int] = {}
+            query(*rays, *interval(rays, 0, np.inf), ADAPTIVE, counters)
+            assert counters["rays"] == 256
+            assert counters["fallbacks"] > 0, "the case that this is about"
+            tree.widen()
