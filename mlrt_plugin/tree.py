@@ -119,8 +119,10 @@ class KdTree:
         """Makes the form of the tree for rays that go alone now: nodes of eight children
         and blocks of eight triangles. Otherwise it is made once so many rays without a
         common origin have come, or are given at once, that it saves the time which it
-        takes; of a lazy tree, which this builds as a whole, never. Returns its bytes. Raises
-        MemoryError if there is no room for it."""
+        takes; of a lazy tree, which this builds as a whole, never. Returns its bytes.
+
+        Raises MemoryError if there is no room for it.
+        """
         return int(self._tree.widen())
 
     def closest_hit(
