@@ -231,8 +231,8 @@ def test_queries_release_the_gil() -> None:
     thread = threading.Thread(target=count)
     thread.start()
     during = 0
-    # With the GIL held, the other thread could run once before and once after a query. Beside
-    # other work it may not run at all during some.
+    # With the GIL held, the other thread could run once before and once after a query.
+    # Beside other work it may not run at all during some.
     for _ in range(20):
         before = ticks
         tree.closest_hit(origins, directions, traversal="brute_force")
