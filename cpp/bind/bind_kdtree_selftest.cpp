@@ -2,6 +2,7 @@
 #include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/build_options.h"
+#include "bind/triangle_arrays.h"
 #include "geometry/clip.h"
 #include "geometry/cover.h"
 #include "geometry/degenerate.h"
@@ -10,7 +11,6 @@
 #include "kdtree/sah.h"
 #include "kdtree/subtree.h"
 
-#include <cstring>
 #include <memory>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -28,8 +28,6 @@ namespace mlrt {
 
 namespace {
 
-using TriangleArray = nb::ndarray<const float, nb::ndim<3>, nb::shape<-1, 3, 3>,
-                                  nb::c_contig, nb::device::cpu>;
 using Point = std::array<float, 3>;
 
 Vec3f vec(const Point &p) {
@@ -37,13 +35,6 @@ Vec3f vec(const Point &p) {
 }
 Point point(Vec3f v) {
     return {v.x, v.y, v.z};
-}
-
-HugeArray<Triangle> triangles_of(const TriangleArray &array) {
-    HugeArray<Triangle> triangles(array.shape(0));
-    if (!triangles.empty())
-        std::memcpy(static_cast<void *>(triangles.data()), array.data(), triangles.bytes());
-    return triangles;
 }
 
 Triangle triangle_of(const std::array<Point, 3> &t) {

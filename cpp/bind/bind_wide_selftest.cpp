@@ -2,6 +2,7 @@
 #include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/build_options.h"
+#include "bind/triangle_arrays.h"
 #include "geometry/sheared_volumes.h"
 #include "kdtree/builder.h"
 #include "kdtree/wide_maker.h"
@@ -20,8 +21,6 @@ namespace mlrt {
 
 namespace {
 
-using TriangleArray = nb::ndarray<const float, nb::ndim<3>, nb::shape<-1, 3, 3>,
-                                  nb::c_contig, nb::device::cpu>;
 using Point = std::array<float, 3>;
 
 // The words that each of them consists of.
@@ -35,11 +34,8 @@ nb::object words_of(const HugeArray<T> &values) {
 }
 
 nb::dict wide_tree(const TriangleArray &array, const nb::kwargs &options) {
-    HugeArray<Triangle> triangles(array.shape(0));
-    if (!triangles.empty())
-        std::memcpy(static_cast<void *>(triangles.data()), array.data(), triangles.bytes());
     const BuiltTree built =
-        *build_kd_tree(std::move(triangles), build_options_from(options));
+        *build_kd_tree(triangles_of(array), build_options_from(options));
     const WideTree wide = make_wide_tree(built.tree);
     nb::dict dict;
     dict["root"] = wide.root.bits();

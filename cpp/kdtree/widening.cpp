@@ -10,9 +10,9 @@ namespace mlrt {
 
 namespace {
 
-// Rays for each reference of the kd-tree whose saving is what the wide tree takes to make,
-// on office, conference, sponza and dragon. To wait for so many never costs more than twice
-// what the best choice does.
+// Rays for each reference of the kd-tree whose saving is about what the wide tree takes to
+// make: estimated from bounces in conference and sponza. If it were exact, to wait for so
+// many would never cost more than twice what the best choice does.
 constexpr double RAYS_PER_REFERENCE = 2;
 
 } // namespace

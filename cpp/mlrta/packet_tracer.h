@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mlrta/frontier.h"
+#include "mlrta/last_occluder.h"
 #include "mlrta/ray_cost.h"
 #include "mlrta/tactics.h"
 #include "mlrta/trace.h"
@@ -122,18 +123,14 @@ private:
         output_.set(first, packet.active, state);
         if constexpr (Output::query == Query::any)
             if (state.hits.found != 0)
-                occluder_ = state.occluder;
+                occluder_.remember(state.occluder);
     }
 
-    // Of Query::any, the rays that stop where one did before: neighbours often do.
+    // Lanes that stop where one did before.
     LaneBits stopped_again(const RayPacket<Origin> &packet, uint32_t first) {
-        if (Output::query == Query::closest || occluder_ == NO_PRIMITIVE ||
-            options_.traversal == Traversal::brute_force)
+        if (options_.traversal == Traversal::brute_force)
             return 0;
-        PacketState<Output::query> state(packet);
-        state.test(packet, packet.active, tree_.triangles[occluder_], occluder_, counters_);
-        output_.set(first, packet.active, state);
-        return state.hits.found;
+        return occluder_.stop(tree_, packet, packet.active, first, output_, counters_);
     }
 
     void trace_from(const RayPacket<Origin> &packet, const Entry &entry,
@@ -223,7 +220,7 @@ private:
             for (uint32_t i = 0; i < active; ++i) {
                 output_.set(numbers[i], hits[i]);
                 if (Output::query == Query::any && hits[i].primitive != NO_PRIMITIVE)
-                    occluder_ = hits[i].primitive;
+                    occluder_.remember(hits[i].primitive);
             }
             cost.add_to_run(begin, std::min(first + count, first + done) - begin);
         }
@@ -255,7 +252,7 @@ private:
     Counters &counters_;
     PacketsOrSingles tactics_;
     std::optional<WideTracer<Origin, Output>> wide_;
-    uint32_t occluder_ = NO_PRIMITIVE; // that stopped rays, of Query::any
+    LastOccluder<Output> occluder_;
 };
 
 } // namespace mlrt

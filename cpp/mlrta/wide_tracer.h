@@ -1,11 +1,11 @@
 // Takes rays of a group through the wide tree, one at a time.
 #pragma once
 
+#include "mlrta/last_occluder.h"
 #include "mlrta/ray_cost.h"
 #include "mlrta/trace.h"
 #include "mlrta/trace_output.h"
 #include "traverse/load_packet.h"
-#include "traverse/packet_state.h"
 #include "traverse/single.h"
 #include "traverse/wide.h"
 
@@ -51,7 +51,7 @@ public:
         counters_.packets += traced != 0;
         for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
         if (active != 0)
-            active &= ~stopped_again(packet, active, first);
+            active &= ~occluder_.stop(tree_, packet, active, first, output_, counters_);
         if (active == 0)
             return;
         if (!waiting_.has_room())
@@ -72,7 +72,7 @@ public:
             if (hits[i].primitive == NO_PRIMITIVE)
                 continue;
             output_.set(waiting_.number[i], hits[i]);
-            occluder_ = hits[i].primitive;
+            occluder_.remember(hits[i].primitive);
         }
         waiting_.count = 0;
     }
@@ -86,24 +86,13 @@ private:
         cost.add_to_run(i, 1);
     }
 
-    // Of Query::any, the rays that stop where one did before: neighbours often do.
-    LaneBits stopped_again(const RayPacket<Origin> &packet, LaneBits lanes,
-                           uint32_t first) {
-        if (Output::query == Query::closest || occluder_ == NO_PRIMITIVE)
-            return 0;
-        PacketState<Output::query> state(packet);
-        state.test(packet, lanes, tree_.triangles[occluder_], occluder_, counters_);
-        output_.set(first, lanes, state);
-        return state.hits.found & lanes;
-    }
-
     const KdTree &tree_;
     const WideTree &wide_;
     const RayGroup &rays_;
     Output output_;
     Counters &counters_;
     WideRays waiting_;
-    uint32_t occluder_ = NO_PRIMITIVE; // that stopped rays, of Query::any
+    LastOccluder<Output> occluder_;
 };
 
 } // namespace mlrt

@@ -10,6 +10,7 @@ import pytest
 from fuzz_process import FuzzProcess
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tracing import TRAVERSALS
 
 from mlrt_plugin.options import BUILDERS
 
@@ -70,19 +71,7 @@ def bounds(draw: Any, count: int) -> Any:
 OPTIONS = st.fixed_dictionaries(
     {},
     optional={
-        "traversal": st.sampled_from(
-            [
-                "brute_force",
-                "single",
-                "wide",
-                "packet",
-                "interval",
-                "beam_leaf",
-                "adaptive",
-                "x",
-                3,
-            ]
-        ),
+        "traversal": st.sampled_from(["brute_force", *TRAVERSALS, "x", 3]),
         "entry_points": st.sampled_from([True, False, None, "yes", 1]),
         "initial_tile": st.sampled_from([1, 3, 16, 64, 1024, 0, -1, 2**40, "8", 1.5]),
         "minimum_tile": st.sampled_from([1, 16, 64, 0, 4096]),
