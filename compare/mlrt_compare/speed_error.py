@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,9 +30,12 @@ from .renderers import Renderer
 from .scene_hash import file_hash, scene_hash
 from .seeds import spread_seeds
 from .settings import Settings
+from .timing import frames_in_a_row
 
 T = TypeVar("T")
 
+TRIALS = 3
+"""Frames of which the fastest tells how many go into a measurement."""
 BATCHES = 64
 """Renders of a reference, each with other random numbers."""
 REFERENCE_SEEDS = (2**32, 2**32 + 1)
@@ -70,6 +74,8 @@ class SpeedError:
     threads: int
     cold: tuple[Cold, Cold]
     references: tuple[BatchReference, BatchReference]
+    frames: tuple[int, ...]
+    """In a row, (S,), of which a time is the mean."""
     runs: tuple[Runs, Runs]
     """Errors against the reference by Mitsuba, and against that by MLRT."""
     rel_mse: np.ndarray[Any, np.dtype[np.float64]]
@@ -89,7 +95,7 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
     written.
     """
     count = len(plan.spp)
-    steps = 2 + 2 * BATCHES + 2 * count * (1 + plan.rounds)
+    steps = 2 + 2 * BATCHES + 2 * count * (1 + TRIALS + plan.rounds)
     with thread_count(settings.threads), ProgressBar("speed and error") as bar:
         done = 0
 
@@ -111,8 +117,18 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
             for renderer in renderers
         ]
         references = both_references(renderers, settings, plan, cache, step)
-        done = steps - 2 * count * plan.rounds
-        seconds, mse, rel_mse = rounds(renderers, references, settings, plan, step)
+        done = steps - 2 * count * (TRIALS + plan.rounds)
+        frames = tuple(
+            frames_in_a_row(
+                min(
+                    stepped(partial(renderer.frame, spp=spp))
+                    for renderer in renderers
+                    for _ in range(TRIALS)
+                )
+            )
+            for spp in plan.spp
+        )
+        seconds, mse, rel_mse = rounds(renderers, references, settings, plan, frames, step)
         threads = int(dr.thread_count())
         bias = bias_test(references[0].tiles, references[1].tiles)
         disputed = None if bias.passed else without_disputes(settings, references)
@@ -128,6 +144,7 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
             Cold(renderers[1].load, renderers[1].build, first[1]),
         ),
         references=references,
+        frames=frames,
         runs=(Runs(plan.spp, seconds, mse[0]), Runs(plan.spp, seconds, mse[1])),
         rel_mse=rel_mse,
         bias=bias,
@@ -172,13 +189,15 @@ def rounds(
     references: tuple[BatchReference, BatchReference],
     settings: Settings,
     plan: Plan,
+    frames: Sequence[int],
     progress: Callable[[], object],
 ) -> tuple[Any, Any, Any]:
-    """Seconds (2, S, rounds), MSE (2 references, 2, S, rounds), relative MSE (2, S,
-    rounds).
+    """Seconds of a frame (2, S, rounds), MSE (2 references, 2, S, rounds), relative MSE (2,
+    S, rounds).
 
-    Both renderers take the same seed, another one each time, and begin in turns. The noise
-    of a reference, which adds to every MSE, is taken off.
+    frames: (S,) in a row, with nothing between them. Of these the time is the mean and the
+    error that of the last. Both renderers take the same seeds, other ones for each frame,
+    and begin in turns. The noise of a reference, which adds to every MSE, is taken off.
     """
     shape = (2, len(plan.spp), plan.rounds)
     seconds, rel_mse, mse = np.empty(shape), np.empty(shape), np.empty((2, *shape))
@@ -186,14 +205,16 @@ def rounds(
     by_mitsuba, by_mlrt = references[1], references[0]
     weights = 1 / (by_mitsuba.mean**2 + REL_MSE_EPSILON)
     noise_of_rel = float(np.mean(by_mitsuba.variance * weights))
-    seeds = iter(spread_seeds(settings.seed, plan.rounds * len(plan.spp)))
+    seeds = iter(spread_seeds(settings.seed, plan.rounds * sum(frames)))
     for number in range(plan.rounds):
         for index, spp in enumerate(plan.spp):
-            seed = next(seeds)
+            in_a_row = list(itertools.islice(seeds, frames[index]))
             order = (0, 1) if (number + index) % 2 == 0 else (1, 0)
             for side in order:
                 at = (side, index, number)
-                seconds[at] = renderers[side].frame(spp=spp, seed=seed)
+                seconds[at] = statistics.fmean(
+                    [renderers[side].frame(spp=spp, seed=seed) for seed in in_a_row]
+                )
                 image = renderers[side].image.astype(np.float64)
                 squares = (image - by_mitsuba.mean) ** 2
                 mse[(0, *at)] = np.mean(squares) - by_mitsuba.mse

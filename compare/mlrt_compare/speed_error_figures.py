@@ -68,6 +68,7 @@ def side_figures(measured: SpeedError, side: int) -> dict[str, Any]:
         points.append(
             {
                 "spp": spp,
+                "frames": measured.frames[index],
                 "first": cold.first[index],
                 "seconds": list(map(float, seconds)),
                 "median": steady,

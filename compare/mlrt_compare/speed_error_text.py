@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
 
-COLOURS = ("#d95f02", "#3465a4")
+from .error_plot import draw_error_curves, scene_name
+from .timing import LEAST_SECONDS
 
 
 def markdown(figures: dict[str, Any]) -> str:
@@ -36,7 +38,7 @@ def markdown(figures: dict[str, Any]) -> str:
         + "**",
         "",
         "Factors are Mitsuba's over MLRT's, above 1 where MLRT is better, with intervals "
-        "of 95 %.",
+        "of 95 %. " + frames_in_a_row(sides[0]["points"]),
         "",
         "| spp | s MLRT | s Mitsuba | MSE MLRT | MSE Mitsuba | time, equal samples "
         "| MSE, equal samples | MSE, equal time | time, equal error |",
@@ -108,6 +110,15 @@ def markdown(figures: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def frames_in_a_row(points: Sequence[dict[str, Any]]) -> str:
+    """What a time is of. points: of either side, which have the same numbers of frames."""
+    counts = ", ".join(f"{point['frames']} at {point['spp']} spp" for point in points)
+    return (
+        f"A time is the mean of frames in a row that take {1e3 * LEAST_SECONDS:.0f} ms or "
+        f"more together ({counts}), the error that of the last of them."
+    )
+
+
 def quiet_tiles(bias: dict[str, Any]) -> str:
     """What became of the tiles that Welch's test leaves out."""
     count, differing = bias["quiet_tiles"], bias["differing_quiet"]
@@ -155,41 +166,15 @@ def seconds(value: float | None) -> str:
 
 
 def plot(figures: dict[str, Any], kind: str) -> bytes:
-    """MSE over seconds of both renderers, logarithmic, with quartiles; ``kind`` is png or
-    svg."""
+    """MSE over the time of a frame of both renderers; ``kind`` is png or svg."""
     figure = Figure(figsize=(7, 4.6), layout="constrained")
     axes = figure.add_subplot()
-    for side, colour in zip(figures["sides"], COLOURS, strict=True):
-        points = side["points"]
-        times = [point["median"] for point in points]
-        errors = [point["mse"] for point in points]
-        spreads = [
-            [abs(point[name] - time) for point, time in zip(points, times, strict=True)]
-            for name in ("minimum", "median")
-        ]
-        axes.errorbar(
-            times,
-            errors,
-            xerr=[spreads[0], spreads[1]],
-            marker="o",
-            color=colour,
-            label=side["name"],
-            linewidth=1.5,
-            markersize=5,
-        )
-        for point in points:
-            axes.annotate(
-                f"{point['spp']}",
-                (point["median"], point["mse"]),
-                textcoords="offset points",
-                xytext=(5, 4),
-                fontsize=8,
-                color=colour,
-            )
-    axes.set(xscale="log", yscale="log", xlabel="seconds a frame (median, from the least)")
+    draw_error_curves(axes, figures["sides"], label_size=8)
+    axes.set_xlabel("milliseconds a frame (median and quartiles)")
     axes.set_ylabel("MSE against the reference")
-    axes.set_title(f"{figures['scene']}: numbers are samples a pixel", fontsize=10)
-    axes.grid(True, which="both", alpha=0.25)
+    axes.set_title(
+        f"{scene_name(figures['scene'])}: numbers are samples a pixel", fontsize=10
+    )
     figure.legend(loc="outside upper center", ncols=2)
     stream = io.BytesIO()
     figure.savefig(stream, format=kind, dpi=150)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -10,6 +11,10 @@ from typing import Any
 DEFAULT_ROUNDS = 3
 """Rounds of A B B A: six frames of each renderer, so one slow frame moves no median."""
 FRAMES_OF_ROUND = 4
+LEAST_SECONDS = 0.05
+"""That a measurement over samples lasts: frames that take less are rendered in a row.
+Chosen, as single frames of a few milliseconds differ by what wakes threads and interrupts
+them."""
 
 
 @dataclass(frozen=True)
@@ -58,3 +63,8 @@ def interleave(
         b.append(second())
         a.append(first())
     return tuple(a), tuple(b)
+
+
+def frames_in_a_row(seconds: float) -> int:
+    """How many frames of so many seconds make a measurement of LEAST_SECONDS or more."""
+    return max(1, math.ceil(LEAST_SECONDS / max(seconds, 1e-6)))

@@ -91,8 +91,9 @@ plt.show()
 
 # %%
 from IPython.display import Image, Markdown
+from mlrt_compare.error_plot import COLOURS
 from mlrt_compare.speed_error_figures import figures_of
-from mlrt_compare.speed_error_text import COLOURS, estimate, markdown, plot
+from mlrt_compare.speed_error_text import estimate, markdown, plot
 
 figures = figures_of(measured, machine) | {"scene": SCENE.name}
 Image(plot(figures, "png"), width=720)

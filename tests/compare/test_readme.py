@@ -78,7 +78,7 @@ def side(name: str, mse: float) -> dict[str, Any]:
         {
             "spp": spp,
             "median": 2.0 * spp,
-            "minimum": 1.5 * spp,
+            "seconds": [1.5 * spp, 2.0 * spp, 2.0 * spp, 3.0 * spp],
             "mse": mse / spp,
             "first": 5,
         }

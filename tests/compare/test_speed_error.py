@@ -61,6 +61,8 @@ def test_a_small_run(tmp_path: Path, cache: Path) -> None:
         for point in side["points"]:
             assert len(point["seconds"]) == len(point["mse_runs"]) == 6
             assert point["first"] > 0 and point["median"] > 0
+            # Frames of so few pixels are not measured one by one.
+            assert point["frames"] > 1
     # The same random numbers: the same error, run by run.
     for ours, theirs in zip(mlrt["points"], mitsuba["points"], strict=True):
         assert ours["mse_runs"] == pytest.approx(theirs["mse_runs"], rel=0.02)
@@ -69,6 +71,7 @@ def test_a_small_run(tmp_path: Path, cache: Path) -> None:
     assert told["machine"]["processor"] and told["machine"]["llvm"]
     text = (tmp_path / "out" / names[1]).read_text()
     assert text in child.stdout and "**PASS**" in text
+    assert f"({mlrt['points'][0]['frames']} at 1 spp, " in text
     with Pillow.open(tmp_path / "out" / names[2]) as picture:
         assert picture.size[0] > 600
 

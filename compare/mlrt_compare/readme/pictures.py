@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image as Pillow
 from PIL import PngImagePlugin
 
+from ..error_plot import draw_error_curves, scene_name
+
 mpl.use("Agg")
 
-COLOURS = ("#d95f02", "#3465a4")
 PARTS = 4
 """Of the picture of a comparison: both images, their difference, pixels that differ."""
 DIGEST = "Figures"
@@ -83,7 +83,7 @@ class Plot:
     def digest(self) -> str:
         drawn = [
             [
-                name_of(scene),
+                scene_name(scene["scene"]),
                 [
                     [side["name"], [panel_point(point) for point in side["points"]]]
                     for side in scene["sides"]
@@ -114,39 +114,14 @@ class Plot:
         return stream.getvalue()
 
 
-def panel_point(point: dict[str, Any]) -> list[float]:
-    """Samples, median and least seconds, and mean squared error."""
-    return [point[key] for key in ("spp", "median", "minimum", "mse")]
+def panel_point(point: dict[str, Any]) -> list[Any]:
+    """Samples, median and all seconds, and mean squared error."""
+    return [point[key] for key in ("spp", "median", "seconds", "mse")]
 
 
 def draw_panel(axes: Axes, scene: dict[str, Any]) -> None:
-    for side, colour in zip(scene["sides"], COLOURS, strict=True):
-        points = np.array([panel_point(point) for point in side["points"]])
-        spp, median, least, mse = points.T
-        axes.errorbar(
-            median,
-            mse,
-            xerr=[median - least, np.zeros_like(median)],
-            marker="o",
-            markersize=4,
-            color=colour,
-            label=" ".join(side["name"].split()[:1]),
-        )
-        for samples, time, error in zip(spp, median, mse, strict=True):
-            axes.annotate(
-                f"{samples:.0f}",
-                (time, error),
-                textcoords="offset points",
-                xytext=(4, 3),
-                fontsize=7,
-                color=colour,
-            )
-    axes.set(xscale="log", yscale="log", xlabel="seconds a frame", ylabel="MSE")
-    axes.set_title(f"{name_of(scene)}, numbers are samples a pixel", fontsize=9)
-    axes.grid(True, which="major", alpha=0.25)
-
-
-def name_of(scene: dict[str, Any]) -> str:
-    """What a scene is called: its file, or its folder where the file is called `scene`."""
-    path = Path(scene["scene"])
-    return path.parent.name if path.stem.startswith("scene") else path.stem
+    sides = [{**side, "name": side["name"].split()[0]} for side in scene["sides"]]
+    draw_error_curves(axes, sides, label_size=7)
+    axes.set(xlabel="milliseconds a frame", ylabel="MSE")
+    name = scene_name(scene["scene"])
+    axes.set_title(f"{name}, numbers are samples a pixel", fontsize=9)

@@ -10,7 +10,7 @@ from ..bench.measure import best
 from ..bench.rays_table import work
 from ..bench.speedup import frame_seconds
 from ..bench.table import number, plural
-from .pictures import name_of
+from ..error_plot import scene_name
 
 Figures = Sequence[dict[str, Any]]
 
@@ -141,7 +141,7 @@ def speed_error_lines(all_figures: Figures) -> list[str]:
     """`mlrt-compare speed-error`: factors over all numbers of samples, and cold starts."""
     warm, cold, failed = [], [], []
     for figures in all_figures:
-        name = name_of(figures)
+        name = scene_name(figures["scene"])
         ours, theirs = figures["sides"]
         spp = [point["spp"] for point in ours["points"]]
         warm.append(
