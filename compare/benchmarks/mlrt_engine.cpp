@@ -1,6 +1,7 @@
 #include "mlrt_engine.h"
 
 #include "kdtree/report.h"
+#include "kdtree/wide_maker.h"
 
 #include <bit>
 #include <cstring>
@@ -198,6 +199,12 @@ std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &option
     if (!built)
         return std::nullopt;
     return TimedTree{std::move(*built), watch.elapsed()};
+}
+
+WideForm make_wide_form(const KdTree &tree) {
+    const Stopwatch watch;
+    const WideTree wide = make_wide_tree(tree);
+    return {watch.elapsed(), wide.bytes()};
 }
 
 Seconds render_frame(const KdTree &tree, const View &view, const TraceOptions &options,

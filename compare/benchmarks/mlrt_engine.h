@@ -26,6 +26,15 @@ struct TimedTree {
 std::optional<TimedTree> build_tree(const Mesh &mesh, const BuildOptions &options,
                                     const std::function<bool()> &cancelled);
 
+struct WideForm {
+    Seconds seconds;
+    uint64_t bytes;
+};
+
+// Makes the form of the tree for rays that go alone, by all threads, and throws it away:
+// the tree is as before.
+WideForm make_wide_form(const KdTree &tree);
+
 Seconds render_frame(const KdTree &tree, const View &view, const TraceOptions &options,
                      const FrameSettings &settings, const FrameOutput &output);
 

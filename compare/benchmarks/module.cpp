@@ -134,6 +134,9 @@ void bind_input(nb::module_ &m) {
     nb::class_<Seconds>(m, "Seconds")
         .def_ro("wall", &Seconds::wall)
         .def_ro("cpu", &Seconds::cpu);
+    nb::class_<WideForm>(m, "WideForm")
+        .def_ro("seconds", &WideForm::seconds)
+        .def_ro("bytes", &WideForm::bytes);
 }
 
 Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
@@ -192,6 +195,11 @@ void bind_mlrt(nb::module_ &m) {
                 tree.widening->make(tree);
             },
             "Makes the form of the tree for rays that go alone.")
+        .def(
+            "make_wide_form",
+            [](const TimedTree &self) { return make_wide_form(self.built.tree); },
+            nb::call_guard<nb::gil_scoped_release>(),
+            "The same, only to tell what it takes: nothing of it is kept.")
         .def_prop_ro("state",
                      [](const TimedTree &self) {
                          const GrowthState state = self.state();

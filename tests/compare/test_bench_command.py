@@ -91,7 +91,13 @@ def test_figures_of_trees_are_those_of_the_plugin(
             + report["references"] * REFERENCE_BYTES
             + len(office.faces) * TRIANGLE_BYTES
         )
+        tree = KdTree(office.vertices, office.faces, builder=builder)
+        assert contenders[name]["wide_bytes"] == tree.widen()
+        assert all(run["wide"]["wall"] > 0 for run in contenders[name]["runs"])
         assert scene["sah_cost"][name] == pytest.approx(report["sah_cost"])
+    for other in ("MLRT lazy", "Embree MEDIUM"):
+        assert "wide_bytes" not in contenders[other]
+        assert all(run["wide"] is None for run in contenders[other]["runs"])
     assert all(0 < share <= 1 for share in scene["built_share"].values())
 
 

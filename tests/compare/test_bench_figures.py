@@ -137,8 +137,17 @@ def test_table_has_a_row_for_each_contender_and_tells_what_counted() -> None:
     assert rows.keys() == set(names)
     assert rows["MLRT fast"] == [
         *("7.00", "(7.00)", "7.00", "1.00", "(1.00)", "1.00", "8.00", "(8.00)", "1/2"),
-        *("0.00100", "100.0", "5.00", "42.00", "11.00", "22.00"),
+        *("0.00100", "100.0", "-", "-", "5.00", "42.00", "11.00", "22.00"),
     ]
+    fast = next(row for row in figures["contenders"] if row["name"] == "MLRT fast")
+    fast["wide_bytes"] = 2_500_000
+    for made, wall in zip(fast["runs"], (0.5, 0.25), strict=True):
+        made["wide"] = {"wall": wall, "cpu": wall, "waited": 0.0}
+    row = next(
+        line for line in build_table.block_lines(scene, figures) if "MLRT fast" in line
+    )
+    # Of the run that others left alone.
+    assert row.split()[13:16] == ["0.500", "(0.500)", "2.50"]
     assert rows["Embree HIGH"][-4:] == ["-"] * 4
 
 

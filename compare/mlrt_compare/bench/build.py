@@ -14,7 +14,15 @@ import numpy.typing as npt
 from mlrt_plugin.threads import thread_count
 
 from .ats import traversal_steps
-from .contenders import EMBREE, MLRT, WARM_UP_FACES, Contender, contenders_of, embree_device
+from .contenders import (
+    EMBREE,
+    LAZY,
+    MLRT,
+    WARM_UP_FACES,
+    Contender,
+    contenders_of,
+    embree_device,
+)
 from .goals import goals_of
 from .measure import ROUNDS_A_REPEAT, Run, in_turns, timed
 from .native import Native
@@ -138,13 +146,19 @@ class SceneBenchmark:
             lambda seconds: seconds,
         )
         contender.facts = {"bytes": int(built.bytes)}
+        wide = None
+        if contender.engine == MLRT and contender.kind != LAZY:
+            form, wide = timed(built.make_wide_form, lambda made: made.seconds)
+            contender.facts["wide_bytes"] = int(form.bytes)
+            del form
         if contender.engine == MLRT:
             contender.facts |= {"state": dict(built.state), "report": dict(built.report)}
         else:
             contender.facts["peak_bytes"] = int(built.peak_bytes)
         if contender.name not in self.frames:
             self._inspect(contender, built)
-        return Run(build, frame, build.busy(threads) or frame.busy(threads))
+        parts = [part for part in (build, frame, wide) if part is not None]
+        return Run(build, frame, any(part.busy(threads) for part in parts), wide)
 
     def _inspect(self, contender: Contender, built: Any) -> None:
         primitives = np.zeros(self._image.shape, np.uint32)
@@ -152,7 +166,7 @@ class SceneBenchmark:
         self.frames[contender.name] = Frame(self._image.copy(), primitives)
         if contender.engine != MLRT:
             return
-        if contender.kind == "lazy":
+        if contender.kind == LAZY:
             self._growth = growth(built)
         else:
             self._sah_costs[contender.name] = float(built.sah_cost())

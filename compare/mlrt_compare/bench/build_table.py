@@ -10,7 +10,7 @@ from .table import aligned, machine_lines, megabytes, number, plural, spread
 
 COLUMNS = (
     *("", "build s", "CPU s", "frame s", "CPU s", "build + frame s", "runs"),
-    *("MB", "bytes/tri", "peak MB", "SAH cost", "ATS", "from root"),
+    *("MB", "bytes/tri", "wide s", "wide MB", "peak MB", "SAH cost", "ATS", "from root"),
 )
 
 
@@ -19,7 +19,8 @@ def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
         *machine_lines(machine),
         f"frame: {settings['resolution']} x {settings['resolution']}, a primary ray a "
         "pixel and a shadow ray a hit; seconds: best (median) of the runs that others left "
-        "alone, which are counted of all runs",
+        "alone, which are counted of all runs; wide: the form of the tree for rays that go "
+        "alone, made after it",
     ]
 
 
@@ -46,11 +47,19 @@ def contender_row(contender: dict[str, Any], scene: dict[str, Any]) -> tuple[str
         f"{sum(not run['busy'] for run in runs)}/{len(contender['runs'])}",
         megabytes(contender["bytes"]),
         f"{contender['bytes'] / max(scene['triangles'], 1):.1f}",
+        *wide_cells(contender),
         "-" if peak is None else megabytes(peak),
         number(scene["sah_cost"].get(contender["name"])),
         number(steps.get("with_entry_points")),
         number(steps.get("from_the_root")),
     )
+
+
+def wide_cells(contender: dict[str, Any]) -> tuple[str, str]:
+    """Seconds and bytes of the form for rays that go alone, where it was made."""
+    if "wide_bytes" not in contender:
+        return "-", "-"
+    return spread(seconds(contender, ("wide",))), megabytes(contender["wide_bytes"])
 
 
 def scene_lines(scene: dict[str, Any]) -> list[str]:

@@ -10,7 +10,8 @@ from typing import Any
 from .measure import Run
 
 MLRT, EMBREE = "MLRT", "Embree"
-BUILDERS, QUALITIES = ("exact", "fast", "lazy"), ("MEDIUM", "HIGH")
+LAZY = "lazy"
+BUILDERS, QUALITIES = ("exact", "fast", LAZY), ("MEDIUM", "HIGH")
 WARM_UP_FACES = 2000
 """Of a scene, that each contender builds and renders before it is measured."""
 ENOUGH_SECONDS = 90.0

@@ -50,6 +50,9 @@ class Run:
     frame: Timing
     busy: bool
     """Whether others had a part of the machine meanwhile."""
+    wide: Timing | None = None
+    """The making of the form for rays that go alone, where there is one; not part of the
+    build, nor of the frame unless that came to need it."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
