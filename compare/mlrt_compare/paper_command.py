@@ -60,7 +60,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     from .bench.machine import machine_record
     from .bench.options import default_cache
     from .paper.scenes import paper_scenes
-    from .paper.study import study
+    from .paper.study import PARTS, add_part, study
 
     plan = plan_of(options)
     source = find_checkout(options.source)
@@ -69,38 +69,49 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     kept = folder / FIGURES
     cache = options.cache or default_cache()
     figures = new_figures("paper", machine_record(source, None), asdict(plan))
-    if options.resume:
-        figures["scenes"] = scenes_to_keep(folder, figures)
-        done = {scene["name"] for scene in figures["scenes"]}
-        scenes = [scene for scene in scenes if scene.name not in done]
+    if options.resume or options.again:
+        figures["scenes"] = scenes_to_keep(folder, figures, bool(options.again))
+    done = {scene["name"]: scene for scene in figures["scenes"]}
 
-    def measure_scene(loaded: Any, scene: dict[str, Any]) -> None:
-        for part in study(loaded, plan):
-            scene |= part
+    def measure_parts(loaded: Any, scene: dict[str, Any], parts: Sequence[str]) -> None:
+        for part in study(loaded, plan, figures["machine"]["commit"], parts):
+            add_part(scene, part)
             keep(kept, figures)
 
-    if scenes:
+    for scene in scenes:
+        if options.again and scene.name in done:
+            measure_parts(scene.load(cache), done[scene.name], options.again)
+    missing = [scene for scene in scenes if scene.name not in done]
+    if missing:
         measure_scenes(
-            figures, scenes, lambda chosen: chosen.load(cache), measure_scene, kept
+            figures,
+            missing,
+            lambda chosen: chosen.load(cache),
+            lambda loaded, scene: measure_parts(loaded, scene, PARTS),
+            kept,
         )
     return figures
 
 
-def scenes_to_keep(folder: Path, figures: dict[str, Any]) -> list[dict[str, Any]]:
+def scenes_to_keep(
+    folder: Path, figures: dict[str, Any], parts_anew: bool
+) -> list[dict[str, Any]]:
     """Those that an earlier run has measured to the end, if there was one.
 
-    Raises CannotRun if it had other settings, another machine or another commit, as then
-    its figures do not belong to those to come.
+    parts_anew: whether some parts are to be measured again, which may be at another commit
+    and with other repeats, as the page tells. Raises CannotRun if the earlier run had
+    other settings, another machine or, unless parts_anew, another commit, as then its
+    figures do not belong to those to come.
     """
     from .paper.study import measured
 
     if not (folder / FIGURES).is_file():
         return []
     earlier = read_figures(folder)
-    for part, keys in (
-        ("settings", tuple(figures["settings"])),
-        ("machine", ("processor", "isa", "commit", "mlrt")),
-    ):
+    settings, machine = figures["settings"].keys(), ["processor", "isa", "commit", "mlrt"]
+    if parts_anew:
+        settings, machine = {"resolution", "tiles"}, ["processor", "isa"]
+    for part, keys in (("settings", settings), ("machine", machine)):
         for name in keys:
             was, now = (json_value(each[part].get(name)) for each in (earlier, figures))
             if was != now:
@@ -160,6 +171,18 @@ def plan_of(options: argparse.Namespace) -> Any:
     )
 
 
+def parts(text: str) -> tuple[str, ...]:
+    from .paper.study import PARTS
+
+    chosen = [name.strip() for name in text.split(",")]
+    for name in chosen:
+        if name not in PARTS:
+            raise argparse.ArgumentTypeError(
+                f"there is no part '{name}': choose from {', '.join(PARTS)}"
+            )
+    return tuple(part for part in PARTS if part in chosen)
+
+
 def paper_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=f"{PROGRAM} paper",
@@ -207,6 +230,15 @@ def paper_parser() -> argparse.ArgumentParser:
         action="store_true",
         help=f"keep the scenes that {FIGURES} in the folder has to the end, and measure "
         "the others only",
+    )
+    parser.add_argument(
+        "--again",
+        type=parts,
+        metavar="PART,...",
+        help="measure these parts of scenes that the folder has to the end once more, and "
+        "keep their others, be they of another commit: counts, grouping, rates (frames a "
+        "second), culling, tiles, trees. Scenes that it does not have are measured as a "
+        "whole",
     )
     parser.add_argument(
         "--redraw",

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import time
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from functools import partial
 from typing import Any
 
 from mlrt_plugin.threads import thread_count
@@ -32,30 +36,74 @@ class Plan:
     tiles: Tiles
 
 
-PARTS = ("counts", "grouping", "rates", "culling", "tiles", "trees")
+OF_ONE_TREE: dict[str, Callable[[StudiedScene, Plan], Any]] = {
+    "counts": lambda studied, plan: count_ways(studied),
+    "grouping": lambda studied, plan: compare_groupings(studied),
+    "rates": lambda studied, plan: frame_rates(studied, plan.threads, plan.repeats),
+    "culling": lambda studied, plan: ablate_culling(studied, plan.repeats),
+    "tiles": lambda studied, plan: sweep_tiles(studied, plan.tiles, plan.repeats),
+}
+TREES = "trees"
+PARTS = (*OF_ONE_TREE, TREES)
 """Of the figures of a scene, in the order in which they are measured."""
 
 
-def study(scene: BenchScene, plan: Plan) -> Iterator[dict[str, Any]]:
-    """Figures of the scene, part by part."""
-    show_status(f"{scene.name}: building")
-    with thread_count(max(plan.threads)):
-        studied = StudiedScene(scene, plan.resolution)
+def study(
+    scene: BenchScene,
+    plan: Plan,
+    commit: str | None,
+    parts: Collection[str] = PARTS,
+) -> Iterator[dict[str, Any]]:
+    """Figures of the scene, part by part, each with what its measuring took (`MEASURED`).
+
+    commit: of the source that is measured. parts: of PARTS.
+    """
+    of_one_tree = [part for part in OF_ONE_TREE if part in parts]
+    if of_one_tree:
+        show_status(f"{scene.name}: building")
+        with thread_count(max(plan.threads)):
+            studied = StudiedScene(scene, plan.resolution)
         published = PUBLISHED.get(scene.name)
         yield {
             "triangles": len(scene.faces),
             "tree": studied.lit.report,
             "published": None if published is None else asdict(published),
         }
-        yield {"counts": count_ways(studied)}
-        yield {"grouping": compare_groupings(studied)}
-    yield {"rates": frame_rates(studied, plan.threads, plan.repeats)}
-    yield {"culling": ablate_culling(studied, plan.repeats)}
-    yield {"tiles": sweep_tiles(studied, plan.tiles, plan.repeats)}
-    del studied  # Large scenes have large trees: one at a time.
-    yield {
-        "trees": ablate_tree(scene, plan.resolution, plan.repeats, max(plan.threads)),
+        for part in of_one_tree:
+            with thread_count(max(plan.threads)):
+                yield timed_part(part, commit, partial(OF_ONE_TREE[part], studied, plan))
+        del studied  # Large scenes have large trees: one at a time.
+    if TREES in parts:
+        threads = max(plan.threads)
+        yield timed_part(
+            TREES,
+            commit,
+            lambda: ablate_tree(scene, plan.resolution, plan.repeats, threads),
+        )
+
+
+MEASURED = "measured"
+"""Of a scene: when each part was measured, in how many seconds, and of which commit."""
+
+
+def timed_part(part: str, commit: str | None, measure: Callable[[], Any]) -> dict[str, Any]:
+    start, cpu = time.perf_counter(), time.process_time()
+    figures = measure()
+    took = {
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seconds": round(time.perf_counter() - start, 3),
+        "cpu_seconds": round(time.process_time() - cpu, 3),
+        "load": os.getloadavg()[0],
+        "commit": commit,
     }
+    return {part: figures, MEASURED: {part: took}}
+
+
+def add_part(scene: dict[str, Any], part: dict[str, Any]) -> None:
+    """Adds what `study` yields to the figures of a scene."""
+    records = {**scene.get(MEASURED, {}), **part.get(MEASURED, {})}
+    scene |= part
+    scene[MEASURED] = records
 
 
 def sound(figures: dict[str, Any]) -> bool:

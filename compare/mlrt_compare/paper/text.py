@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import statistics
+from collections.abc import Sequence
 from typing import Any
 
 from ..bench.markdown import row
 from .published import PUBLISHED, PublishedCounts
 from .sections import culling_lines, grouping_lines, rate_lines, tile_lines, tree_lines
-from .study import measured, sound
+from .study import MEASURED, PARTS, measured, sound
 from .ways import COUNTED, PAPER, WITHOUT
 
 SETTINGS = (
@@ -45,6 +47,7 @@ def markdown(figures: dict[str, Any]) -> str:
         ("Control: random groups of rays", grouping_lines),
     ):
         lines += ["", f"## {title}", "", *section(measured(figures))]
+    lines += ["", "## What measuring took", "", *measuring_lines(figures)]
     return "\n".join(lines) + "\n"
 
 
@@ -110,6 +113,53 @@ def count_lines(figures: dict[str, Any], kind: str) -> list[str]:
     add("ratio", lambda w, o: o["steps"] / w["steps"], lambda p: p.reduction)
     add("tests with MLRTA", lambda w, _: w["tests"], lambda p: p.tests)
     add("tests without", lambda _, o: o["tests"], lambda p: p.tests_without)
+    return [*lines, *mean_lines(scenes, kind)]
+
+
+def mean_lines(scenes: Sequence[dict[str, Any]], kind: str) -> list[str]:
+    """Means of the ratios, of scenes that the paper has too."""
+    both = []
+    for scene in scenes:
+        published = published_counts(scene["name"], kind)
+        if published is not None:
+            ways = scene["counts"]["ways"]
+            own = ways[WITHOUT.key][kind]["steps"] / ways[PAPER.key][kind]["steps"]
+            both.append((own, published.reduction))
+    if len(both) < 2:
+        return []
+    own, theirs = (statistics.fmean(ratios) for ratios in zip(*both, strict=True))
+    return [
+        "",
+        f"The mean of the {len(both)} ratios is {own:.2f}, that of the paper's "
+        f"{theirs:.2f}.",
+    ]
+
+
+def measuring_lines(figures: dict[str, Any]) -> list[str]:
+    """Seconds of each part; parts of another commit than the page's are told by name."""
+    scenes = [scene for scene in measured(figures) if MEASURED in scene]
+    lines = [
+        "Seconds of each part, and in brackets those of all processors together; a part "
+        "takes more of the former where frames that others disturbed were repeated.",
+        "",
+        row("scene", *PARTS),
+        "|---|" + "--:|" * len(PARTS),
+    ]
+    others = []
+    for scene in scenes:
+        records = [scene[MEASURED].get(part) for part in PARTS]
+        cells = [
+            "" if took is None else f"{took['seconds']:.0f} ({took['cpu_seconds']:.0f})"
+            for took in records
+        ]
+        lines.append(row(scene["name"], *cells))
+        others += [
+            f"{part} of {scene['name']} at {(took['commit'] or 'no commit')[:10]}"
+            for part, took in zip(PARTS, records, strict=True)
+            if took is not None and took["commit"] != figures["machine"]["commit"]
+        ]
+    if others:
+        lines += ["", f"Of other commits than the rest: {', '.join(others)}."]
     return lines
 
 
