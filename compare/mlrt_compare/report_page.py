@@ -17,8 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .bench.table import plural
+from .metrics import RELATIVE_TOLERANCE
 from .options import without_nonfinite
 from .run import Comparison
+from .validate import MAXIMUM_SHARE
 
 SCRIPTS = ("images.js", "view.js", "main.js")
 MIDDLE_GREY = 0.18
@@ -50,7 +53,7 @@ def report_page(
         "exposure": first_exposure(second),
         "error_scale": first_error_scale(first, second),
         "passed": figures["passed"],
-        "verdict": figures["verdict"],
+        "verdict": verdict_text(figures),
         "timings": figures["timings"],
         "timing_notes": timing_notes(comparison),
         "difference": difference_rows(figures),
@@ -160,6 +163,18 @@ def machine_rows(machine: dict[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
+def verdict_text(figures: dict[str, Any]) -> str:
+    """The verdict, and where it is favourable what it is of."""
+    if not figures["passed"]:
+        return str(figures["verdict"])
+    found = figures["difference"]
+    return (
+        f"{figures['verdict']}: {found['differing']:,} of {found['pixels']:,} pixels "
+        f"differ by more than {RELATIVE_TOLERANCE:g} of the larger value; "
+        f"{100 * MAXIMUM_SHARE:g} % may"
+    )
+
+
 def plot_of(speed_error: dict[str, Any] | None) -> dict[str, Any]:
     """The plot of speed against error as SVG in base64, and what has to be said of it."""
     if speed_error is None:
@@ -167,9 +182,11 @@ def plot_of(speed_error: dict[str, Any] | None) -> dict[str, Any]:
     from .speed_error_text import estimate, plot
 
     notes = (
-        f"At equal time MLRT has {estimate(speed_error['equal_time'])} times less MSE, at "
-        f"equal error it takes {estimate(speed_error['equal_error'])} times less time "
-        f"(95 % intervals); measured {speed_error['machine']['time']}."
+        f"{speed_error['width']} x {speed_error['height']} pixels, "
+        f"{plural(speed_error['threads'])}. At equal time MLRT has "
+        f"{estimate(speed_error['equal_time'])} times less MSE, at equal error it takes "
+        f"{estimate(speed_error['equal_error'])} times less time (95 % intervals); "
+        f"measured {speed_error['machine']['time']}."
     )
     if not speed_error["passed"]:
         notes += " Not to be called a speed-up: " + "; ".join(speed_error["reasons"]) + "."

@@ -41,8 +41,11 @@ class Timings:
 
     @property
     def jit(self) -> float | None:
-        """What tracing and compiling kernels took: the first frame without a steady one."""
-        return None if self.kernels_compiled is None else self.first - self.steady
+        """What tracing and compiling kernels took: the first frame without a steady one; 0
+        if that took longer."""
+        if self.kernels_compiled is None:
+            return None
+        return max(self.first - self.steady, 0.0)
 
     def as_dict(self) -> dict[str, Any]:
         return {**asdict(self), "steady": self.steady, "jit": self.jit}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import re
 import shutil
@@ -77,6 +78,21 @@ def test_images_are_embedded_bit_for_bit() -> None:
     assert (words ^ unpacked(data["images"][1]) == second.view(np.uint32).ravel()).all()
     assert (unpacked(data["cost"]) == cost.view(np.uint32).ravel()).all()
     assert (data["width"], data["height"], data["plot"]) == (WIDTH, HEIGHT, None)
+
+
+def test_the_verdict_says_what_it_is_of() -> None:
+    agreeing = comparison()
+    same = agreeing.mlrt.image.copy()
+    same[~np.isfinite(same)] = 1.0
+    sides = {
+        name: dataclasses.replace(getattr(agreeing, name), image=same)
+        for name in ("mlrt", "mitsuba")
+    }
+    agreeing = dataclasses.replace(agreeing, **sides, verdict=judge(same, same))
+    told = data_of(report_page(agreeing, MACHINE, None))
+    pixels = f"{WIDTH * HEIGHT:,}"
+    assert told["verdict"].startswith(f"PASS: 0 of {pixels} pixels differ by more than")
+    assert data_of(report_page(comparison(), MACHINE, None))["verdict"].startswith("FAIL: ")
 
 
 def test_equal_images_are_stored_once() -> None:

@@ -23,6 +23,7 @@ def test_steady_is_the_median_and_jit_the_rest_of_the_first_frame() -> None:
     assert timings.steady == 3
     assert timings.jit == pytest.approx(7)
     assert Timings(1.0, None, 10.0, (2.0,)).jit is None
+    assert Timings(1.0, None, 1.0, (2.0,), kernels_compiled=2).jit == 0
 
 
 def test_short_frames_are_measured_in_a_row() -> None:
