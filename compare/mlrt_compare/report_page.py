@@ -179,14 +179,13 @@ def plot_of(speed_error: dict[str, Any] | None) -> dict[str, Any]:
     """The plot of speed against error as SVG in base64, and what has to be said of it."""
     if speed_error is None:
         return {"plot": None, "plot_notes": ""}
-    from .speed_error_text import estimate, plot
+    from .speed_error_text import over_all, plot
 
     notes = (
         f"{speed_error['width']} x {speed_error['height']} pixels, "
-        f"{plural(speed_error['threads'])}. At equal time MLRT has "
-        f"{estimate(speed_error['equal_time'])} times less MSE, at equal error it takes "
-        f"{estimate(speed_error['equal_error'])} times less time (95 % intervals); "
-        f"measured {speed_error['machine']['time']}."
+        f"{plural(speed_error['threads'])}. MLRT, over all: "
+        f"{'; '.join(over_all(speed_error))}; intervals of 95 %, measured "
+        f"{speed_error['machine']['time']}."
     )
     if not speed_error["passed"]:
         notes += " Not to be called a speed-up: " + "; ".join(speed_error["reasons"]) + "."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -63,10 +63,7 @@ def markdown(figures: dict[str, Any]) -> str:
         lines.append("| " + " | ".join(cells) + " |")
     lines += [
         "",
-        f"Over all: at equal time {estimate(figures['equal_time'])} times less MSE, at "
-        f"equal error {estimate(figures['equal_error'])} times less time (geometric means "
-        f"over {len(figures['equal_time_spp'])} and {len(figures['equal_error_spp'])} of "
-        f"{len(figures['samples'])} numbers of samples, where the curves overlap).",
+        "Over all: " + "; ".join(over_all(figures)) + ".",
         "",
         "| | load | build | first frame | JIT | slope of MSE |",
         "|---|---|---|---|---|---|",
@@ -108,6 +105,21 @@ def markdown(figures: dict[str, Any]) -> str:
         "",
     ]
     return "\n".join(lines)
+
+
+def over_all(figures: dict[str, Any]) -> Iterator[str]:
+    """Both factors, a phrase each, or that the curves do not tell them."""
+    count = len(figures["samples"])
+    for kind, less in (("time", "MSE"), ("error", "time")):
+        factor = figures[f"equal_{kind}"]
+        if factor["value"] is None:
+            yield f"the curves do not overlap at equal {kind}"
+            continue
+        yield (
+            f"at equal {kind} {estimate(factor)} times less {less} (geometric mean over "
+            f"{len(figures[f'equal_{kind}_spp'])} of {count} numbers of samples, where the "
+            "curves overlap)"
+        )
 
 
 def frames_in_a_row(points: Sequence[dict[str, Any]]) -> str:

@@ -59,8 +59,8 @@ print(f"{comparison.threads} threads; images: {comparison.verdict}")
 
 # %%
 import matplotlib.pyplot as plt
+from mlrt_compare.error_plot import COLOURS
 
-COLOURS = ("#d95f02", "#3465a4")
 figure, (frames, cold) = plt.subplots(
     1, 2, figsize=(12, 4.2), layout="constrained", width_ratios=(3, 2)
 )
@@ -70,7 +70,7 @@ for side, colour in zip(sides, COLOURS, strict=True):
     frames.axhline(1000 * side.timings.steady, color=colour, linewidth=1)
 frames.set(xlabel="frame", ylabel="milliseconds", ylim=(0, None))
 frames.set_title("Steady frames, in order; lines are medians", loc="left")
-frames.legend(loc="lower right")
+figure.legend(loc="outside lower center", ncols=2)
 
 parts = ("load", "build", "first", "steady")
 for number, (side, colour) in enumerate(zip(sides, COLOURS, strict=True)):

@@ -86,7 +86,7 @@ def test_a_small_run(tmp_path: Path, cache: Path) -> None:
 )
 def test_a_wrong_image_is_no_speed_up(tmp_path: Path, how: str, said: str) -> None:
     child = python(
-        *("-c", BENT.format(how=how), "speed-error", SCENE, *SMALL),
+        *("-c", BENT.format(how=how), "speed-error", SCENE, *SMALL, "--rounds", "4"),
         *("--cache", tmp_path / "cache", "-o", tmp_path),
     )
     assert child.returncode == 2, child.stdout + child.stderr
