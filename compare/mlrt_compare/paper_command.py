@@ -74,7 +74,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     done = {scene["name"]: scene for scene in figures["scenes"]}
 
     def measure_parts(loaded: Any, scene: dict[str, Any], parts: Sequence[str]) -> None:
-        for part in study(loaded, plan, figures["machine"]["commit"], parts):
+        for part in study(loaded, plan, figures["machine"]["commit"], scene, parts):
             add_part(scene, part)
             keep(kept, figures)
 

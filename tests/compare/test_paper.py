@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 from pathlib import Path
@@ -15,17 +16,20 @@ from mlrt_compare.bench.frame_runs import FrameRun
 from mlrt_compare.bench.measure import Timing
 from mlrt_compare.bench.scenes import BenchScene, imported
 from mlrt_compare.cli import main
+from mlrt_compare.paper import scenes as paper_scenes
 from mlrt_compare.paper.ablation import ablate_culling, ablate_tree
 from mlrt_compare.paper.counts import counts_of
 from mlrt_compare.paper.frame_times import summary
 from mlrt_compare.paper.grouping import groupings
 from mlrt_compare.paper.published import PUBLISHED, PublishedCounts
+from mlrt_compare.paper.rates import frame_rates
 from mlrt_compare.paper.scenes import StudiedScene
 from mlrt_compare.paper.sections import rate
 from mlrt_compare.paper.study import sound
 from mlrt_compare.paper.tables import count_ways
 from mlrt_compare.paper.text import markdown
 from mlrt_compare.paper.tile_sweep import Tiles, combinations, sweep_tiles
+from mlrt_compare.paper.ways import PAPER, TIMED, WITHOUT
 from PIL import Image as Pillow
 
 OFFICE = repository.ROOT / "scenes" / "office" / "office.xml"
@@ -236,6 +240,40 @@ def test_frames_that_others_disturb_are_marked_unless_others_were_left_alone() -
     assert only["rate"] == 0.125 and rate(only).endswith("*")
 
 
+def test_what_is_too_slow_is_not_timed_and_told_as_such(
+    studied: StudiedScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    counted = {way.key: {"cpu_seconds": 0.0} for way in TIMED}
+    counted[WITHOUT.key]["cpu_seconds"] = 2 * 25.0
+    single, double = frame_rates(studied, (1,), 1, counted)
+    slow = double["ways"][WITHOUT.key]
+    assert (single["shadows"], double["shadows"]) == (False, True)
+    assert single["ways"][WITHOUT.key]["rate"] > 0
+    assert slow["rate"] is None and slow["runs"] == [] and rate(slow) == "under 0.0200"
+    assert all(
+        frame["rate"] > 0 for key, frame in double["ways"].items() if key != WITHOUT.key
+    )
+    (_, both) = frame_rates(studied, (4,), 1, counted)
+    assert both["ways"][WITHOUT.key]["rate"] > 0
+
+
+def test_hits_are_held_against_each_other_with_shadow_rays_and_without(
+    office: BenchScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    studied = StudiedScene(office, 32)
+    for limit in (2**22, 1):
+        monkeypatch.setattr(paper_scenes, "SHADOWED_TRIANGLES", limit)
+        found = [studied.counters_and_hits(way.options) for way in (WITHOUT, PAPER)]
+        assert np.array_equal(found[0][1], found[1][1])
+        assert len(np.unique(found[0][1])) > 100
+        assert (
+            found[0][0]["primary_traversal_steps"] > found[1][0]["primary_traversal_steps"]
+        )
+    # A pixel that sees another face does not pass.
+    moved = StudiedScene(dataclasses.replace(office, faces=office.faces[::-1].copy()), 32)
+    assert not np.array_equal(moved.counters_and_hits(PAPER.options)[1], found[0][1])
+
+
 def test_trees_without_a_part_of_the_builder_differ_as_they_must(
     office: BenchScene,
 ) -> None:
@@ -292,7 +330,7 @@ def test_smaller_tiles_take_more_search_and_leave_less_to_packets(
 def test_tiles_of_large_scenes_are_counted_without_shadow_rays(
     studied: StudiedScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mlrt_compare.paper.tile_sweep.SHADOWED_TRIANGLES", 10)
+    monkeypatch.setattr("mlrt_compare.paper.scenes.SHADOWED_TRIANGLES", 10)
     (row,) = sweep_tiles(studied, Tiles((32,), (32,)), 1)
     assert row["primary"]["steps"] > 0 and "primary_and_shadow" not in row
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -40,8 +41,8 @@ TREE_FACTS = ("inner_nodes", "leaves", "references", "sah_cost", "depth", "secon
 
 def ablate_tree(scene: BenchScene, side: int, repeats: int, threads: int) -> dict[str, Any]:
     """A row for each of TREES: facts of the tree, counts of primary rays with and without
-    MLRTA, and the frame of these with MLRTA on one thread; and whether the image with
-    shadow rays was the same.
+    MLRTA, and the frame of these with MLRTA on one thread; and whether all hit the
+    same, see `StudiedScene.counters_and_hits`.
 
     Trees are built on ``threads``, one after another, as some are large.
     """
@@ -58,12 +59,12 @@ def ablate_tree(scene: BenchScene, side: int, repeats: int, threads: int) -> dic
             "options": options,
             "tree": {fact: report.get(fact) for fact in TREE_FACTS},
         }
-        result = studied.lit.render(**PAPER.options)
-        first = result.image if first is None else first
-        one_image &= np.array_equal(first.view(np.uint32), result.image.view(np.uint32))
-        from_root = studied.unlit.render(**WITHOUT.options)
-        for way, found in ((PAPER, result), (WITHOUT, from_root)):
-            counts = counts_of(found.counters, "primary", studied.rays)
+        counters, hits = studied.counters_and_hits(PAPER.options)
+        first = hits if first is None else first
+        one_image &= np.array_equal(first, hits)
+        from_root = studied.unlit.render(**WITHOUT.options).counters
+        for way, counted in ((PAPER, counters), (WITHOUT, from_root)):
+            counts = counts_of(counted, "primary", studied.rays)
             row[way.key] = {"primary": counts.as_dict()}
         with thread_count(1):
             status = f"{scene.name}: frames, {name}"
@@ -75,27 +76,31 @@ def ablate_tree(scene: BenchScene, side: int, repeats: int, threads: int) -> dic
 
 def ablate_culling(studied: StudiedScene, repeats: int) -> dict[str, Any]:
     """A row for each of CULLINGS: counts of primary rays, tiles that nothing was found for,
-    and the frame without shadow rays on one thread; and whether the image with shadow rays
-    was the same."""
+    and the frame without shadow rays on one thread; and whether all hit the same, see
+    `StudiedScene.counters_and_hits`."""
     ways = {name: {**PAPER.options, **options} for name, options in CULLINGS.items()}
     rows = []
-    first = studied.lit.render(**WITHOUT.options).image.view(np.uint32)
+    first = studied.counters_and_hits(WITHOUT.options)[1]
     one_image = True
+    took = []
     for name, options in ways.items():
-        result = studied.lit.render(**options)
-        one_image &= np.array_equal(first, result.image.view(np.uint32))
+        start = time.process_time()
+        counters, hits = studied.counters_and_hits(options)
+        took.append(time.process_time() - start)
+        one_image &= np.array_equal(first, hits)
         rows.append(
             {
                 "name": name,
                 "options": CULLINGS[name],
-                "primary": counts_of(result.counters, "primary", studied.rays).as_dict(),
-                "tiles": result.counters["primary_tiles"],
-                "missed_tiles": result.counters["primary_missed_tiles"],
+                "primary": counts_of(counters, "primary", studied.rays).as_dict(),
+                "tiles": counters["primary_tiles"],
+                "missed_tiles": counters["primary_missed_tiles"],
             }
         )
     with thread_count(1):
         status = f"{studied.scene.name}: frames with other culling"
-        frames = time_in_turns(studied.unlit, list(ways.values()), 1, repeats, status)
+        ways_in_order = list(ways.values())
+        frames = time_in_turns(studied.unlit, ways_in_order, 1, repeats, status, took)
     for row, frame in zip(rows, frames, strict=True):
         row["frame"] = frame
     return {"rows": rows, "one_image": bool(one_image)}

@@ -87,13 +87,13 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
             frames = [block["ways"][way.key] for block in blocks]
             bars = axes.bar(
                 np.arange(len(blocks)) + 0.11 * number - 0.33,
-                [frame["rate"] for frame in frames],
+                [known(frame["rate"]) for frame in frames],
                 0.1,
                 color=COLOURS[number],
                 label=way.name,
             )
             for bar, frame in zip(bars, frames, strict=True):
-                bar.set_alpha(1 if frame["left_alone"] else 0.35)
+                bar.set_alpha(1 if frame.get("left_alone") else 0.35)
         published = PUBLISHED.get(scene["name"])
         for place, block in enumerate(blocks):
             if published is None or published.rates is None or published.shaded is None:
@@ -134,7 +134,7 @@ def draw_trees(scenes: Sequence[dict[str, Any]]) -> Figure:
             "steps without MLRTA": lambda row: row[WITHOUT.key]["primary"]["steps"],
             "steps with": lambda row: row[PAPER.key]["primary"]["steps"],
             "tests": lambda row: row[WITHOUT.key]["primary"]["tests"],
-            "CPU time": lambda row: row["frame"]["cpu"],
+            "CPU time": lambda row: known(row["frame"]["cpu"]),
         },
     )
 
@@ -146,7 +146,7 @@ def draw_culling(scenes: Sequence[dict[str, Any]]) -> Figure:
         {
             "steps": lambda row: row["primary"]["steps"],
             "of which search": lambda row: row["primary"]["entry_steps"],
-            "CPU time": lambda row: row["frame"]["cpu"],
+            "CPU time": lambda row: known(row["frame"]["cpu"]),
         },
     )
 
@@ -271,6 +271,11 @@ def draw_grouping(scenes: Sequence[dict[str, Any]]) -> Figure:
         fontsize=8,
     )
     return figure
+
+
+def known(value: float | None) -> float:
+    """Nothing is drawn of what was not timed."""
+    return np.nan if value is None else value
 
 
 def panels(figure: Figure, count: int) -> list[Any]:

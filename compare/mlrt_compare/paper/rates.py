@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mlrt_plugin.threads import thread_count
@@ -14,10 +14,18 @@ from .ways import TIMED
 
 
 def frame_rates(
-    studied: StudiedScene, threads: Sequence[int], repeats: int
+    studied: StudiedScene,
+    threads: Sequence[int],
+    repeats: int,
+    counted: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
     """A block for each number of threads and kind of rays: summaries of frames, by the
-    key of the way."""
+    key of the way.
+
+    counted: of each way, by its key, what `count_ways` found, with shadow rays. Ways that
+    were too slow there are not timed with these.
+    """
+    cpu = [counted.get(way.key, {}).get("cpu_seconds", 0.0) for way in TIMED]
     blocks = []
     for count in threads:
         for shadows in (False, True):
@@ -29,6 +37,7 @@ def frame_rates(
                     count,
                     repeats,
                     status,
+                    [seconds / count for seconds in cpu] if shadows else (),
                 )
             blocks.append(
                 {

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from mlrt_plugin.render import PreparedScene, prepare
 from mlrt_plugin.scene_arrays import Emitter, Film, Lighting, SceneArrays
@@ -25,6 +26,9 @@ from ..bench.scenes import (
 USUAL = ("office", "conference", "building", "dragon")
 LARGE_DRAGON = "dragon-7.2M"
 """What stands in for the paper's dragon: as many triangles."""
+SHADOWED_TRIANGLES = 2**22
+"""Above that shadow rays are traced for tables 2 and 3 only: one interval for rays that go
+apart takes minutes a frame then; chosen."""
 
 
 def paper_scenes(source: Path, names: Sequence[str] | None) -> list[SceneSource]:
@@ -81,6 +85,23 @@ class StudiedScene:
     def rays(self) -> int:
         """Of the camera, in a frame."""
         return self.side * self.side
+
+    @property
+    def shadows_are_quick(self) -> bool:
+        return len(self.scene.faces) <= SHADOWED_TRIANGLES
+
+    def counters_and_hits(
+        self, options: Mapping[str, Any]
+    ) -> tuple[Mapping[str, int], npt.NDArray[np.uint32]]:
+        """Counters of a frame, and what must be the same whatever the options are: the bits
+        of the image with shadow rays or, where these are not quick, of the distances and
+        faces that are hit."""
+        if self.shadows_are_quick:
+            result = self.lit.render(**options)
+            return result.counters, result.image.view(np.uint32)
+        result = self.unlit.render(**options, aovs=("depth", "prim"))
+        hits = [np.ascontiguousarray(result.aovs[name]) for name in ("depth", "prim")]
+        return result.counters, np.stack([each.view(np.uint32) for each in hits])
 
     def prepared(self, shadows: bool) -> PreparedScene:
         return self.lit if shadows else self.unlit

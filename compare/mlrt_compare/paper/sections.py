@@ -7,6 +7,7 @@ from typing import Any
 
 from ..bench.markdown import table
 from ..bench.table import number, plural
+from .frame_times import SLOW_SECONDS
 from .grouping import WAYS
 from .published import PUBLISHED
 from .ways import PAPER, TIMED, WITHOUT
@@ -19,8 +20,10 @@ def rate_lines(scenes: Scenes) -> list[str]:
         "Whole frames, from rays to the film: medians of those that others left alone; a "
         "star marks ways that had none, whose rates are not to be published. With one "
         "point light and shadow rays; the paper's shaded frames have a light at the camera "
-        "and no shadow rays. Its processors: Pentium 4, 2.5 GHz with OpenRT, 2.4 GHz with "
-        "one thread of MLRTA, 3.2 GHz with two threads on one core.",
+        "and no shadow rays. Ways of which a frame takes more than "
+        f"{SLOW_SECONDS:g} s, as counting the steps told, are not timed. Its processors: "
+        "Pentium 4, 2.5 GHz with OpenRT, 2.4 GHz with one thread of MLRTA, 3.2 GHz with "
+        "two threads on one core.",
     ]
     for scene in scenes:
         blocks = scene["rates"]
@@ -36,7 +39,16 @@ def rate_lines(scenes: Scenes) -> list[str]:
 
 
 def rate(frame: dict[str, Any]) -> str:
+    if frame["rate"] is None:
+        return f"under {number(1 / frame['least_seconds'])}"
     return number(frame["rate"]) + ("" if frame["left_alone"] else "\\*")
+
+
+def milliseconds(frame: dict[str, Any]) -> str:
+    """Of the processor; what was not timed is told by its least."""
+    if frame["cpu"] is None:
+        return f"over {1e3 * frame['least_seconds']:,.0f}"
+    return f"{1e3 * frame['cpu']:.1f}"
 
 
 def published_rates(scene: dict[str, Any]) -> Iterator[list[str]]:
@@ -75,7 +87,7 @@ def tree_lines(scenes: Scenes) -> list[str]:
                 f"{row[WITHOUT.key]['primary']['steps']:.2f}",
                 f"{row[PAPER.key]['primary']['steps']:.2f}",
                 f"{row[WITHOUT.key]['primary']['tests']:.2f}",
-                f"{1e3 * row['frame']['cpu']:.1f}",
+                milliseconds(row["frame"]),
             ]
             for row in scene["trees"]["rows"]
         ]
@@ -97,7 +109,7 @@ def culling_lines(scenes: Scenes) -> list[str]:
                 f"{row['primary']['entry_steps']:.2f}",
                 f"{row['tiles']:,}",
                 f"{row['missed_tiles']:,}",
-                f"{1e3 * row['frame']['cpu']:.1f}",
+                milliseconds(row["frame"]),
             ]
             for row in scene["culling"]["rows"]
         ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -36,12 +36,16 @@ class Plan:
     tiles: Tiles
 
 
-OF_ONE_TREE: dict[str, Callable[[StudiedScene, Plan], Any]] = {
-    "counts": lambda studied, plan: count_ways(studied),
-    "grouping": lambda studied, plan: compare_groupings(studied),
-    "rates": lambda studied, plan: frame_rates(studied, plan.threads, plan.repeats),
-    "culling": lambda studied, plan: ablate_culling(studied, plan.repeats),
-    "tiles": lambda studied, plan: sweep_tiles(studied, plan.tiles, plan.repeats),
+Found = Mapping[str, Any]
+"""Figures of the scene so far."""
+OF_ONE_TREE: dict[str, Callable[[StudiedScene, Plan, Found], Any]] = {
+    "counts": lambda studied, plan, found: count_ways(studied),
+    "grouping": lambda studied, plan, found: compare_groupings(studied),
+    "rates": lambda studied, plan, found: frame_rates(
+        studied, plan.threads, plan.repeats, found["counts"]["ways"]
+    ),
+    "culling": lambda studied, plan, found: ablate_culling(studied, plan.repeats),
+    "tiles": lambda studied, plan, found: sweep_tiles(studied, plan.tiles, plan.repeats),
 }
 TREES = "trees"
 PARTS = (*OF_ONE_TREE, TREES)
@@ -52,11 +56,13 @@ def study(
     scene: BenchScene,
     plan: Plan,
     commit: str | None,
+    found: Found,
     parts: Collection[str] = PARTS,
 ) -> Iterator[dict[str, Any]]:
     """Figures of the scene, part by part, each with what its measuring took (`MEASURED`).
 
-    commit: of the source that is measured. parts: of PARTS.
+    commit: of the source that is measured. found: figures of the scene, to which whoever
+    takes the parts adds them. parts: of PARTS; rates need counts, of found or of these.
     """
     of_one_tree = [part for part in OF_ONE_TREE if part in parts]
     if of_one_tree:
@@ -71,7 +77,9 @@ def study(
         }
         for part in of_one_tree:
             with thread_count(max(plan.threads)):
-                yield timed_part(part, commit, partial(OF_ONE_TREE[part], studied, plan))
+                yield timed_part(
+                    part, commit, partial(OF_ONE_TREE[part], studied, plan, found)
+                )
         del studied  # Large scenes have large trees: one at a time.
     if TREES in parts:
         threads = max(plan.threads)

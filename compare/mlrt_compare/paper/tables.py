@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,14 @@ from .ways import COUNTED
 
 def count_ways(studied: StudiedScene) -> dict[str, Any]:
     """Counts of each way, by the key of the way and the kind of rays, and whether all ways
-    gave one image, bit for bit."""
+    gave one image, bit for bit.
+
+    What each took tells which are too slow to be timed, no more."""
     ways: dict[str, Any] = {}
     images = []
     for way in COUNTED:
         show_status(f"{studied.scene.name}: counting, {way.name}")
+        start = time.process_time()
         result = studied.lit.render(**way.options)
         images.append(result.image)
         ways[way.key] = {
@@ -28,6 +32,7 @@ def count_ways(studied: StudiedScene) -> dict[str, Any]:
                 for kind in KINDS
             },
             "counters": result.counters,
+            "cpu_seconds": time.process_time() - start,
         }
     show_status("")
     first = images[0].view(np.uint32)

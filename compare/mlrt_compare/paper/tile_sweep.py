@@ -15,10 +15,6 @@ from .frame_times import time_in_turns
 from .scenes import StudiedScene
 from .ways import PAPER_SEARCH
 
-SHADOWED_TRIANGLES = 2**22
-"""Above that shadow rays are left out: one interval for rays that go apart takes many
-seconds a frame then; chosen."""
-
 
 @dataclass(frozen=True)
 class Tiles:
@@ -42,10 +38,10 @@ def combinations(tiles: Tiles) -> list[dict[str, Any]]:
 
 def sweep_tiles(studied: StudiedScene, tiles: Tiles, repeats: int) -> list[dict[str, Any]]:
     """A row for each combination with the paper's search and traversal: counts of primary
-    rays and, up to SHADOWED_TRIANGLES, with shadow rays, and the frame without shadow rays
-    on one thread."""
+    rays and, where they are quick, with shadow rays, and the frame without shadow rays on
+    one thread."""
     options = combinations(tiles)
-    shadows = len(studied.scene.faces) <= SHADOWED_TRIANGLES
+    shadows = studied.shadows_are_quick
     kinds = ("primary", "primary_and_shadow") if shadows else ("primary",)
     rows = []
     for number, tried in enumerate(options):

@@ -239,6 +239,7 @@ def paper_lines(all_figures: Figures) -> list[str]:
     """`mlrt-compare paper`: tables 1 to 3 in short."""
     # What is measured with Mitsuba is not needed for the tables of the paper.
     from ..paper.published import PUBLISHED
+    from ..paper.sections import rate
     from ..paper.study import measured
     from ..paper.ways import ADAPTIVE, PAPER, WITHOUT
 
@@ -260,9 +261,8 @@ def paper_lines(all_figures: Figures) -> list[str]:
         for block in scene["rates"]:
             found = [block["ways"][way.key] for way in (WITHOUT, PAPER, ADAPTIVE)]
             rays = "primary and shadow" if block["shadows"] else "primary"
-            gain = found[2]["rate"] / found[1]["rate"]
             rows = [scene["name"], plural(block["threads"]), rays]
-            rates.append([*rows, *map(starred, found), ratio(gain)])
+            rates.append([*rows, *map(rate, found), gain(found[1], found[2])])
     pages = ", ".join(
         f"[{name}](compare/results/{name}/paper.md)"
         for name in dict.fromkeys(each["folder"] for each in all_figures)
@@ -288,8 +288,9 @@ def paper_lines(all_figures: Figures) -> list[str]:
     ]
 
 
-def starred(frame: dict[str, Any]) -> str:
-    return number(frame["rate"]) + ("" if frame["left_alone"] else "\\*")
+def gain(before: dict[str, Any], after: dict[str, Any]) -> str:
+    """Of rates; what was too slow to be timed has none."""
+    return "-" if before["rate"] is None else ratio(after["rate"] / before["rate"])
 
 
 def leak_lines(all_figures: Figures) -> list[str]:
