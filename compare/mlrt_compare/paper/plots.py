@@ -11,7 +11,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from ..bench.table import plural
 from .grouping import WAYS
@@ -22,6 +22,8 @@ from .ways import PAPER, TIMED, WITHOUT
 
 COLOURS = ("#3465a4", "#d95f02", "#4e9a06", "#75507b", "#c4a000", "#a40000", "#555753")
 PALE = "#babdb6"
+LINEAR_RANGE = 20
+"""Bars that are as many times higher than those of other scenes are drawn logarithmic."""
 
 
 def plots(figures: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
@@ -59,6 +61,7 @@ def draw_steps(scenes: Sequence[dict[str, Any]]) -> Figure:
                 axes.annotate(
                     f"{ratio:.2f}x",
                     (place + 0.42 * group + 0.095 - 0.3, 0),
+                    xycoords=axes.get_xaxis_transform(),
                     xytext=(0, -11),
                     textcoords="offset points",
                     ha="center",
@@ -69,6 +72,9 @@ def draw_steps(scenes: Sequence[dict[str, Any]]) -> Figure:
         axes.set_xticks(range(len(scenes)), [f"\n{scene['name']}" for scene in scenes])
         axes.tick_params(axis="x", length=0)
         axes.set(ylabel="steps for 16 rays", title=title)
+        highest = [highest_bar(scene, kind) for scene in scenes]
+        if max(highest) > LINEAR_RANGE * min(highest):
+            axes.set(yscale="log", ylim=(1, None))
         axes.spines[["top", "right"]].set_visible(False)
     figure.suptitle(
         "without MLRTA (blue) and with it (orange), of which search (hatched);\n"
@@ -76,6 +82,11 @@ def draw_steps(scenes: Sequence[dict[str, Any]]) -> Figure:
         fontsize=9,
     )
     return figure
+
+
+def highest_bar(scene: dict[str, Any], kind: str) -> float:
+    ways = scene["counts"]["ways"]
+    return max(float(ways[way.key][kind]["steps"]) for way in (WITHOUT, PAPER))
 
 
 def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
@@ -110,6 +121,9 @@ def draw_rates(scenes: Sequence[dict[str, Any]]) -> Figure:
             ],
         )
         axes.set(ylabel="frames/s", yscale="log", title=scene["name"])
+        axes.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
         axes.spines[["top", "right"]].set_visible(False)
     figure.legend(
         *figure.axes[0].get_legend_handles_labels(),
