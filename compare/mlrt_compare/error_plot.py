@@ -84,6 +84,10 @@ def write_plain_times(axes: Axes, span: float) -> None:
 
 
 def scene_name(scene: str | Path) -> str:
-    """What a scene is called: its file, or its folder where the file is called `scene`."""
+    """What a scene is called: its file, or its folder where the file is called `scene`, and
+    in brackets what else that is called, as in `scene_direct`."""
     path = Path(scene)
-    return path.parent.name if path.stem.startswith("scene") else path.stem
+    if not path.stem.startswith("scene"):
+        return path.stem
+    kind = path.stem.removeprefix("scene").strip("_-")
+    return f"{path.parent.name} ({kind})" if kind else path.parent.name

@@ -13,6 +13,7 @@ import pytest
 import repository
 from mlrt_compare.bench.checkout import LANDMARKS
 from mlrt_compare.bench.cli import main
+from mlrt_compare.error_plot import scene_name
 from mlrt_compare.readme.page import BEGIN, END, RESULTS, page_of, spliced
 from mlrt_compare.readme.pictures import Pair, Plot
 from mlrt_compare.readme.tables import speed_error_lines
@@ -73,6 +74,9 @@ def test_a_figure_that_changed_is_found_and_drawn(checkout: Path) -> None:
     assert "| **0.43** (7.65) |" in readme.read_text()
 
 
+LIVING_ROOM = "living-room (direct)"
+
+
 def side(name: str, mse: float) -> dict[str, Any]:
     points = [
         {
@@ -109,16 +113,26 @@ def speed_error(**changes: Any) -> dict[str, Any]:
 
 def test_speed_and_error_are_told_with_what_speaks_against_them() -> None:
     lines = speed_error_lines([speed_error()])
-    warm = next(line for line in lines if line.startswith("| living-room | 64 x 48"))
+    warm = next(line for line in lines if line.startswith(f"| {LIVING_ROOM} | 64 x"))
     slope = "-1.002 (-1.010 to -0.990)"
     assert warm == (
-        f"| living-room | 64 x 48 | 1 to 4 | **0.50** (0.25 to 0.75) | - | {slope} "
+        f"| {LIVING_ROOM} | 64 x 48 | 1 to 4 | **0.50** (0.25 to 0.75) | - | {slope} "
         f"| {slope} | **FAIL** |"
     )
-    cold = next(line for line in lines if line.startswith("| living-room | 0.250"))
-    assert cold == "| living-room | 0.250 | - | 5.00 | 0.250 | - | 5.00 | never |"
-    assert "- living-room: a bias shows" in lines
-    assert "- living-room: times that are not to be published, of MLRT 1 at 4 spp" in lines
+    cold = next(line for line in lines if line.startswith(f"| {LIVING_ROOM} | 0.250"))
+    assert cold == f"| {LIVING_ROOM} | 0.250 | - | 5.00 | 0.250 | - | 5.00 | never |"
+    assert f"- {LIVING_ROOM}: a bias shows" in lines
+    assert (
+        f"- {LIVING_ROOM}: times that are not to be published, of MLRT 1 at 4 spp" in lines
+    )
+
+
+def test_scenes_of_one_folder_have_names_of_their_own() -> None:
+    names = [
+        scene_name(f"rooms/living-room/{file}.xml") for file in ("scene", "scene_direct")
+    ]
+    assert names == ["living-room", "living-room (direct)"]
+    assert scene_name("conference/conference_area.xml") == "conference_area"
 
 
 def test_a_plot_is_stale_when_a_figure_in_it_changed(tmp_path: Path) -> None:
