@@ -30,7 +30,7 @@ from .renderers import Renderer
 from .scene_hash import file_hash, scene_hash
 from .seeds import spread_seeds
 from .settings import Settings
-from .timing import frames_in_a_row
+from .timing import LEAST_SECONDS, frames_in_a_row
 
 T = TypeVar("T")
 
@@ -51,6 +51,8 @@ class Plan:
     rounds: int
     reference_factor: int
     """Samples of a reference over the largest of ``spp``."""
+    least_seconds: float = LEAST_SECONDS
+    """That a measurement of time lasts, of as many frames in a row."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,8 @@ def measure(settings: Settings, plan: Plan, cache: ReferenceCache) -> SpeedError
                     stepped(partial(renderer.frame, spp=spp))
                     for renderer in renderers
                     for _ in range(TRIALS)
-                )
+                ),
+                plan.least_seconds,
             )
             for spp in plan.spp
         )

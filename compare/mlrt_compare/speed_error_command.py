@@ -26,6 +26,7 @@ from .options import (
     write_json,
 )
 from .scene_command import show_warning
+from .timing import LEAST_SECONDS
 
 DEFAULT_SPP = (1, 2, 4, 8, 16, 32, 64)
 DEFAULT_ROUNDS = 16
@@ -54,7 +55,9 @@ def run(arguments: Sequence[str]) -> int:
     from .speed_error_text import markdown, plot
 
     warnings.showwarning = show_warning
-    plan = Plan(options.spp, options.rounds, options.reference_factor)
+    plan = Plan(
+        options.spp, options.rounds, options.reference_factor, options.least_seconds
+    )
     machine = machine_of_comparison()
     try:
         measured = measure(settings, plan, cache)
@@ -96,6 +99,16 @@ def sample_counts(text: str) -> tuple[int, ...]:
     return tuple(sorted({convert(part) for part in text.split(",")}))
 
 
+def short_seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number") from None
+    if not 0 <= value <= 60:
+        raise argparse.ArgumentTypeError(f"{text} is not from 0 to 60 seconds")
+    return value
+
+
 def speed_error_parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog=f"{PROGRAM} speed-error",
@@ -127,6 +140,14 @@ def speed_error_parser() -> argparse.ArgumentParser:
         default=REFERENCE_FACTOR,
         metavar="N",
         help="samples of the references over the most samples measured (%(default)s)",
+    )
+    parser.add_argument(
+        "--least-seconds",
+        type=short_seconds,
+        default=LEAST_SECONDS,
+        metavar="S",
+        help="that a measurement of time lasts, of frames in a row if need be "
+        "(%(default)s)",
     )
     parser.add_argument(
         "--cache",

@@ -29,6 +29,7 @@ def figures_of(measured: SpeedError, machine: dict[str, Any]) -> dict[str, Any]:
         "defines": dict(measured.settings.defines),
         "threads": measured.threads,
         "rounds": measured.plan.rounds,
+        "least_seconds": measured.plan.least_seconds,
         "machine": machine,
         "reference": {
             "spp": measured.references[1].spp,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from .error_plot import draw_error_curves, scene_name
-from .timing import LEAST_SECONDS
 
 
 def markdown(figures: dict[str, Any]) -> str:
@@ -38,7 +37,7 @@ def markdown(figures: dict[str, Any]) -> str:
         + "**",
         "",
         "Factors are Mitsuba's over MLRT's, above 1 where MLRT is better, with intervals "
-        "of 95 %. " + frames_in_a_row(sides[0]["points"]),
+        "of 95 %. " + frames_in_a_row(figures),
         "",
         "| spp | s MLRT | s Mitsuba | MSE MLRT | MSE Mitsuba | time, equal samples "
         "| MSE, equal samples | MSE, equal time | time, equal error |",
@@ -122,11 +121,13 @@ def over_all(figures: dict[str, Any]) -> Iterator[str]:
         )
 
 
-def frames_in_a_row(points: Sequence[dict[str, Any]]) -> str:
-    """What a time is of. points: of either side, which have the same numbers of frames."""
+def frames_in_a_row(figures: dict[str, Any]) -> str:
+    """What a time is of; both sides have the same numbers of frames."""
+    points = figures["sides"][0]["points"]
     counts = ", ".join(f"{point['frames']} at {point['spp']} spp" for point in points)
     return (
-        f"A time is the mean of frames in a row that take {1e3 * LEAST_SECONDS:.0f} ms or "
+        "A time is the mean of frames in a row that take "
+        f"{1e3 * figures['least_seconds']:g} ms or "
         f"more together ({counts}), the error that of the last of them."
     )
 

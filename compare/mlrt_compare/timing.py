@@ -68,6 +68,6 @@ def interleave(
     return tuple(a), tuple(b)
 
 
-def frames_in_a_row(seconds: float) -> int:
-    """How many frames of so many seconds make a measurement of LEAST_SECONDS or more."""
-    return max(1, math.ceil(LEAST_SECONDS / max(seconds, 1e-6)))
+def frames_in_a_row(seconds: float, least: float = LEAST_SECONDS) -> int:
+    """How many frames of so many seconds make a measurement of ``least`` or more."""
+    return max(1, math.ceil(least / max(seconds, 1e-6)))

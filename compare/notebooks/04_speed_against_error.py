@@ -35,6 +35,7 @@ RESOLUTION = (96, 96) if SMALL else (256, 256)
 SPP = (1, 2, 4, 8) if SMALL else (1, 2, 4, 8, 16, 32, 64)
 ROUNDS = 6 if SMALL else 16
 REFERENCE_FACTOR = 64  # samples of the reference over the most samples measured
+LEAST_SECONDS = 0.0 if SMALL else 0.05  # that a measurement of time lasts
 
 mlrt_plugin.__version__
 
@@ -51,7 +52,7 @@ from mlrt_compare.speed_error import Plan, measure
 machine = machine_of_comparison()  # with the load before anything is measured
 settings = Settings(SCENE, resolution=RESOLUTION)
 cache = ReferenceCache(Path(tempfile.mkdtemp()) if SMALL else None)
-measured = measure(settings, Plan(SPP, ROUNDS, REFERENCE_FACTOR), cache)
+measured = measure(settings, Plan(SPP, ROUNDS, REFERENCE_FACTOR, LEAST_SECONDS), cache)
 print(*measured.names, sep=" and ")
 
 # %% [markdown]

@@ -47,7 +47,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_small_run(tmp_path: Path, cache: Path) -> None:
     child = python(
-        *("-m", "mlrt_compare", "speed-error", SCENE, *SMALL),
+        *("-m", "mlrt_compare", "speed-error", SCENE, *SMALL, "--least-seconds", "0.01"),
         *("--cache", cache, "-o", tmp_path / "out"),
     )
     assert child.returncode == 0, child.stdout + child.stderr
@@ -86,7 +86,8 @@ def test_a_small_run(tmp_path: Path, cache: Path) -> None:
 )
 def test_a_wrong_image_is_no_speed_up(tmp_path: Path, how: str, said: str) -> None:
     child = python(
-        *("-c", BENT.format(how=how), "speed-error", SCENE, *SMALL, "--rounds", "4"),
+        *("-c", BENT.format(how=how), "speed-error", SCENE, *SMALL),
+        *("--least-seconds", "0"),
         *("--cache", tmp_path / "cache", "-o", tmp_path),
     )
     assert child.returncode == 2, child.stdout + child.stderr
@@ -138,7 +139,16 @@ def test_faces_in_the_same_plane_stand_apart(tmp_path: Path, cache: Path) -> Non
     scene.write_text(COINCIDENT)
     child = python(
         *("-m", "mlrt_compare", "speed-error", scene, "--spp", "1,2,4", "--rounds", "4"),
-        *("--reference-factor", "256", "--cache", cache, "-o", tmp_path / "out"),
+        *(
+            "--least-seconds",
+            "0",
+            "--reference-factor",
+            "256",
+            "--cache",
+            cache,
+            "-o",
+            tmp_path / "out",
+        ),
     )
     told = json.loads((tmp_path / "out" / "coincident-speed-error.json").read_text())
     assert not told["bias"]["passed"], child.stdout
@@ -164,6 +174,8 @@ def test_a_missing_scene_is_one_sentence(tmp_path: Path) -> None:
         ((SCENE, "--spp", "1,0"), "0 is less than 1"),
         ((SCENE, "--spp", "many"), "'many' is not a whole number"),
         ((SCENE, "--rounds", "3"), "3 is less than 4"),
+        ((SCENE, "--least-seconds", "nan"), "nan is not from 0 to 60 seconds"),
+        ((SCENE, "--least-seconds", "long"), "'long' is not a number"),
         ((SCENE, "-o", SCENE), "not a folder"),
         ((SCENE, "--cache", SCENE), "--cache"),
     ],
