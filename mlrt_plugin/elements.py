@@ -48,7 +48,8 @@ class Element:
                 continue
             seen.add(id(element))
             yield element
-            waiting.extend(child for _, child in reversed(element.children))
+            if element.children:
+                waiting += [child for _, child in reversed(element.children)]
 
     def __str__(self) -> str:
         name = f"{self.kind} '{self.plugin}'"
@@ -91,7 +92,7 @@ class Places:
     many.
     """
 
-    def __init__(self, files: list[Path]) -> None:
+    def __init__(self, files: list[str]) -> None:
         self._files = files
         self._line_ends: dict[int, list[int]] = {}
 
@@ -100,7 +101,7 @@ class Places:
         if file >= len(self._files):
             return ""
         if file not in self._line_ends:
-            content = np.frombuffer(self._files[file].read_bytes(), np.uint8)
+            content = np.frombuffer(Path(self._files[file]).read_bytes(), np.uint8)
             self._line_ends[file] = np.flatnonzero(content == ord("\n")).tolist()
         ends = self._line_ends[file]
         line = bisect.bisect_left(ends, offset)
@@ -112,7 +113,7 @@ def from_state(state: Any) -> list[Element]:
     """The element of each node of a parsed scene; the first is the scene itself. Objects
     that are the same in all variants, images, count as properties."""
     elements = []
-    places = Places([Path(str(file)) for file in state.files])
+    places = Places([str(file) for file in state.files])
     # Scenes have a hundred thousand nodes: names of enumerations are looked up once.
     kinds = {t: KINDS.get(t.name, t.name.lower()) for t in mi.ObjectType}
     reference: Any = mi.Properties.ResolvedReference
@@ -151,6 +152,8 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
         nested["exterior"] = instance.exterior_medium()
         if element.plugin == "instance":
             element.properties["loaded"] = True
+        if element.plugin in ("sphere", "cylinder"):
+            element.properties["to_world"] = objects.members(instance)["to_world"]
         if element.plugin == "rectangle":
             element.properties["flip_normals"] = bool(instance.has_flipped_normals())
     elif kind == "sensor":

@@ -69,7 +69,7 @@ void add_textures(std::vector<Material> &materials,
     }
 }
 
-Specular specular_from(nb::handle dict, const std::string &name) {
+Specular specular_from(nb::handle dict, const std::string &name, size_t texture_count) {
     Fields fields(dict, name);
     Specular specular;
     specular.type = fields.choice<SpecularType>(
@@ -78,6 +78,9 @@ Specular specular_from(nb::handle dict, const std::string &name) {
                  {"thindielectric", SpecularType::thindielectric}});
     specular.reflectance = fields.vector("reflectance", specular.reflectance);
     specular.transmittance = fields.vector("transmittance", specular.transmittance);
+    specular.reflectance_texture = fields.index("reflectance_texture", texture_count, NONE);
+    specular.transmittance_texture =
+        fields.index("transmittance_texture", texture_count, NONE);
     specular.eta = fields.vector("eta", specular.eta);
     specular.k = fields.vector("k", specular.k);
     specular.ior = fields.number("ior", specular.ior);
@@ -92,7 +95,8 @@ using SpecularSides = std::vector<std::tuple<uint32_t, uint32_t, bool>>;
 void add_speculars(SceneData &scene, const nb::list &speculars,
                    const SpecularSides &sides) {
     for (size_t i = 0; i < speculars.size(); ++i)
-        scene.speculars.push_back(specular_from(speculars[i], numbered("speculars", i)));
+        scene.speculars.push_back(
+            specular_from(speculars[i], numbered("speculars", i), scene.textures.size()));
     if (!sides.empty() && sides.size() != scene.materials.size())
         refuse_value(
             "material_speculars must be empty or have as many entries as materials.");
@@ -158,18 +162,18 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.type =
         fields.choice<EmitterType>("type", {{"point", EmitterType::point},
                                             {"spot", EmitterType::spot},
+                                            {"projector", EmitterType::projector},
                                             {"directional", EmitterType::directional},
                                             {"area", EmitterType::area},
                                             {"constant", EmitterType::constant},
                                             {"envmap", EmitterType::envmap}});
-    const bool point = emitter.type == EmitterType::point;
     const bool spot = emitter.type == EmitterType::spot;
     const bool directional = emitter.type == EmitterType::directional;
     const bool area = emitter.type == EmitterType::area;
 
     emitter.radiance = fields.vector("radiance");
-    emitter.position =
-        point || spot ? fields.vector("position") : fields.vector("position", {});
+    emitter.position = is_at_point(emitter.type) ? fields.vector("position")
+                                                 : fields.vector("position", {});
     emitter.direction = spot || directional ? unit_vector(fields, "direction")
                                             : fields.vector("direction", {});
     emitter.cutoff_angle =
@@ -185,6 +189,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.edge_v = rectangle ? fields.vector("edge_v") : fields.vector("edge_v", {});
     if (fields.has("axes"))
         emitter.axes = fields.vectors("axes");
+    emitter.half_size = fields.vector2("half_size", {1, 1});
+    emitter.mis_compensation = fields.boolean("mis_compensation", false);
     emitter.sampling_weight = fields.number("sampling_weight", 1);
     fields.finish();
 
@@ -192,8 +198,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
         refuse_value(fields.path("sampling_weight") + " must not be negative.");
     if (spot && !(emitter.beam_width <= emitter.cutoff_angle && emitter.beam_width >= 0))
         refuse_value(fields.path("beam_width") + " must be from 0 to the cut-off angle.");
-    if (emitter.radiance_texture != NONE && !rectangle)
-        refuse_value(fields.path("radiance_texture") + " is for rectangles that glow.");
+    if (!(emitter.half_size.x > 0 && emitter.half_size.y > 0))
+        refuse_value(fields.path("half_size") + " must be positive.");
     if (area && emitter.shape == NONE)
         refuse_value(fields.path("shape") + " must name the shape that glows.");
     const double volume =

@@ -6,11 +6,11 @@
 #include "render/environment.h"
 #include "render/glowing_faces.h"
 #include "render/point_light.h"
+#include "render/projector.h"
 #include "render/scene.h"
 #include "render/texture_sampler.h"
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -23,6 +23,7 @@ struct EmitterTable {
     TextureSampler texture;    // area, with a texture: of its points
     float edge_scale = 1;      // area: a power of two, 1 unless the area is tiny
     PointLight<float> point{}; // point, spot
+    Projector projector;       // projector
     float unevenness = 0;      // rectangle: how far it lies off the plane of its first face
     bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
@@ -33,14 +34,16 @@ struct PreparedScene {
     std::vector<uint32_t> shape_of_face;
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
+    // All faces that glow lie between these, the last not included.
+    uint32_t first_glowing_face = NONE, glowing_face_end = 0;
     bool any_material_is_textured = false;
-    bool all_emitters_are_points = true;      // or spots
+    bool all_emitters_are_points = true;      // or spots, of those that are ever chosen
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
-    std::optional<GlowingFaces> glowing;
-    Box3f bounds;   // of all that rays can hit
-    Vec3f center{}; // of a sphere around the bounds
+    LazyGlowingFaces glowing; // asked for BSDF samples only
+    Box3f bounds;             // of all that rays can hit
+    Vec3f center{};           // of a sphere around the bounds
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);

@@ -40,8 +40,9 @@ double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
                   double samples) {
     const double of_emitters =
         scene.all_emitters_are_points ? 0 : settings.sampling.emitter_samples;
+    const uint32_t bsdf_samples = settings.sampling.bsdf_samples;
     const double of_bsdfs =
-        looks_for_light_first(scene) ? 0 : settings.sampling.bsdf_samples;
+        bsdf_samples > 0 && looks_for_light_first(scene) ? 0 : bsdf_samples;
     return samples * (of_emitters + of_bsdfs);
 }
 

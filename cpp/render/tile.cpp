@@ -263,11 +263,14 @@ void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacke
 LaneBits TileRenderer::add_emission(const HitPacket &hit,
                                     const SurfacePoint<FloatPacket> &point,
                                     const UIntPacket &shapes, LaneBits seen_from_front) {
-    if (!scene_.any_shape_glows)
+    const LaneBits maybe =
+        hit.lanes & to_bits((hit.faces >= UIntPacket(scene_.first_glowing_face)) &
+                            (hit.faces < UIntPacket(scene_.glowing_face_end)));
+    if (maybe == 0)
         return hit.lanes;
     LaneBits hidden = 0;
     const LaneArray<uint32_t> rays = to_lanes<uint32_t>(hit.ray);
-    for_each_value(shapes, hit.lanes, [&](uint32_t shape, LaneBits holders) {
+    for_each_value(shapes, maybe, [&](uint32_t shape, LaneBits holders) {
         const uint32_t number = scene_.data.shapes[shape].emitter;
         if (number == NONE)
             return;

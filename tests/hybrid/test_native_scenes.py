@@ -25,6 +25,9 @@ SKY = (
     '<float name="scale" value="0.7"/><transform name="to_world">'
     '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
 )
+COMPENSATED = SKY.replace(
+    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
+)
 CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 
 
@@ -39,12 +42,36 @@ SAMPLERS = {
 }
 
 
+def projector(picture: str, more: str = "", move: str = "") -> str:
+    return (
+        f'<emitter type="projector"><transform name="to_world">{move}<lookat '
+        'origin="-2, 3, 3" target="0, 0.4, 0" up="0.2, 1, 0"/></transform>'
+        f"{picture}{more}</emitter>"
+    )
+
+
+PICTURE = parts.texture("irradiance", "bitmap", parts.text("filename", "image.png"))
+BOARD = parts.texture("irradiance", "checkerboard")
+
+
 def scene(**more: str) -> str:
     return parts.scene(GLOSSLESS, integrator=NO_BSDF_SAMPLES, **more)
 
 
 SCENES = {
     "envmap": scene(lights=SKY),
+    "compensated envmap": scene(lights=COMPENSATED + parts.LAMP),
+    "projector": scene(lights=projector(PICTURE, parts.number("scale", 12))),
+    "projector by its height": scene(
+        lights=projector(PICTURE, parts.number("fov", 50) + parts.text("fov_axis", "y"))
+    ),
+    "projector that is scaled": scene(
+        lights=projector(PICTURE, move='<scale x="1.5" y="-0.7" z="2"/>')
+    ),
+    "projector of a colour": scene(lights=projector(parts.colour("irradiance"))),
+    "projector among lights": scene(
+        lights=projector(BOARD, parts.number("scale", 20)) + parts.PANEL + parts.LAMP
+    ),
     "constant": scene(lights=CONSTANT + parts.LAMP),
     "envmap among lights": scene(lights=parts.PANEL + SKY + parts.LAMP),
     "thinlens": scene(eye=parts.sensor("thinlens", LENS)),
