@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-import drjit as dr
 import numpy as np
 import numpy.typing as npt
 
@@ -147,7 +146,7 @@ def half_size_of(projector: Any, to_world: npt.NDArray[np.float64]) -> Vec2:
     lies; there, as in a camera, x points left.
     """
     module = objects.variant_module(projector)
-    place = dr.zeros(module.SurfaceInteraction3f)
+    place = module.SurfaceInteraction3f()
     place.p = module.Point3f(*(to_world @ [-0.25, -0.25, 1, 1])[:3].tolist())
     sample, _ = projector.sample_direction(place, module.Point2f(0.5, 0.5))
     u, v = np.asarray(sample.uv, np.float64).reshape(-1)
@@ -183,9 +182,9 @@ def is_compensated(envmap: Any, to_world: npt.NDArray[np.float64]) -> bool:
             -math.cos(phi) * math.sin(theta),
         )
         way = to_world[:3, :3] @ local
-        sample = dr.zeros(module.DirectionSample3f)
+        sample = module.DirectionSample3f()
         sample.d = module.Vector3f(*(way / np.linalg.norm(way)).tolist())
-        place = dr.zeros(module.SurfaceInteraction3f)
+        place = module.SurfaceInteraction3f()
         return objects.number(envmap.pdf_direction(place, sample))
 
     answers = [density(int(row) + 1, int(column)) for row, column in places]

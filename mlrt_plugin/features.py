@@ -141,10 +141,13 @@ def is_turned(shape: Element) -> bool:
     to_world = shape.properties.get("to_world")
     if to_world is not None:
         axes = objects.matrix(to_world)[:3, :3]
-    ends = [shape.properties.get(name) for name in ("p0", "p1")]
-    if all(end is not None for end in ends):
+    if shape.plugin == "cylinder":
+        ends = (
+            shape.properties.get("p0", (0, 0, 0)),
+            shape.properties.get("p1", (0, 0, 1)),
+        )
         x, y, z = (float(b) - float(a) for a, b in zip(*ends, strict=True))
-        if max(abs(x), abs(y)) > NOT_TURNED * abs(z) or z <= 0:
+        if z <= 0 or max(abs(x), abs(y)) > NOT_TURNED * z:
             return True
     diagonal = np.diag(axes)
     others = np.abs(axes - np.diag(diagonal)).max()
