@@ -94,7 +94,7 @@ REMARKS = {
     "`--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
-    ("integrator", "moment"): "by Mitsuba, around one `direct` or `path` with `max_depth` "
+    ("integrator", "moment"): "around one `direct` or `path` with `max_depth` "
     "2; else `--force-direct`",
     ("shape", "shapegroup"): "a tree of its own; where Mitsuba shades, see `instance`",
     ("shape", "instance"): "where Mitsuba shades, of meshes it is written out into the "

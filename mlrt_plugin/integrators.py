@@ -189,8 +189,6 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
     if lighting.integrator == "depth":
         return ""
     name = named(features, lighting)
-    if lighting.integrator == "moment" and not what_is_missing(lighting):
-        return f"{name} asks for second moments, which only the path by Mitsuba computes"
     for what in ("emitter_samples", "bsdf_samples"):
         count = getattr(lighting, what)
         if count > MOST_SAMPLES:

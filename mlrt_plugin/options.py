@@ -51,7 +51,7 @@ SHADOW_OFFSETS = ("mitsuba", "robust")
 """Values of the option ``shadow_offset``: ``cpp/render/shadow_offset.h``."""
 
 AOVS = ("depth", "normal", "prim", "cost", "moment")
-"""Images that can be had beside the colours: `cost` natively, `moment` by Mitsuba only."""
+"""Images that can be had beside the colours: `cost` natively only."""
 
 
 def integer(value: object, name: str) -> int:

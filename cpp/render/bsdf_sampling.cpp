@@ -105,7 +105,7 @@ Scattering scattering_of(const PreparedScene &scene, const HitPacket &hit,
                           [&](uint32_t lane) { scattering.specular[lane] = specular; });
         }
     });
-    if (scene.any_material_is_textured)
+    if (lanes & scene.textured_faces.lanes_of(hit.faces))
         add_textures(scene,
                      {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
                      lanes, seen_from_front, scattering.albedo, scattering.opacity);

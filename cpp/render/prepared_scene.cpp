@@ -157,12 +157,12 @@ PreparedScene::PreparedScene(SceneData scene_data)
         const Shape &shape = data.shapes[i];
         if (shape.emitter != NONE) {
             any_shape_glows = true;
-            first_glowing_face = std::min(first_glowing_face, shape.first_face);
-            glowing_face_end = shape.first_face + shape.face_count;
+            glowing_faces.add(shape);
         }
         shape_materials.push_back(shape.material == NONE ? Material{}
                                                          : data.materials[shape.material]);
-        any_material_is_textured |= shape_materials.back().is_textured();
+        if (shape_materials.back().is_textured())
+            textured_faces.add(shape);
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 

@@ -4,6 +4,7 @@
 #include "render/camera.h"
 #include "render/distribution.h"
 #include "render/environment.h"
+#include "render/face_range.h"
 #include "render/glowing_faces.h"
 #include "render/point_light.h"
 #include "render/projector.h"
@@ -34,9 +35,7 @@ struct PreparedScene {
     std::vector<uint32_t> shape_of_face;
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
-    // All faces that glow lie between these, the last not included.
-    uint32_t first_glowing_face = NONE, glowing_face_end = 0;
-    bool any_material_is_textured = false;
+    FaceRange glowing_faces, textured_faces;  // the latter by their materials
     bool all_emitters_are_points = true;      // or spots, of those that are ever chosen
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely

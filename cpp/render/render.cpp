@@ -20,6 +20,7 @@ void make_room(const RenderSettings &settings, size_t pixel_count, RenderResult 
     result.image = PixelArray<float>(3 * pixel_count);
     result.depth = PixelArray<float>(aovs.depth ? pixel_count : 0);
     result.normal = PixelArray<float>(aovs.normal ? 3 * pixel_count : 0);
+    result.moment = PixelArray<float>(aovs.moment ? 6 * pixel_count : 0);
     result.primitive = PixelArray<int32_t>(aovs.primitive ? pixel_count : 0);
     result.cost = PixelArray<float>(aovs.cost ? pixel_count : 0);
     std::fill_n(result.cost.data(), result.cost.size(), 0.0f);
@@ -32,6 +33,8 @@ FilmTarget film_target(RenderResult &result) {
         target.others.push_back({result.depth.data(), 1});
     for (int k = 0; k < 3 && result.normal.size() > 0; ++k)
         target.others.push_back({result.normal.data() + k, 3});
+    for (int k = 0; k < 6 && result.moment.size() > 0; ++k)
+        target.others.push_back({result.moment.data() + k, 6});
     return target;
 }
 

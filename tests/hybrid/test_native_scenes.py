@@ -141,3 +141,23 @@ def test_image_is_that_of_direct(assets: Path, name: str) -> None:
     path = assets / f"native-{name.replace(' ', '-')}.xml"
     path.write_text(SCENES[name])
     assert_parity(path)
+
+
+@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
+def test_moments_are_those_of_mitsuba(assets: Path, rfilter: str) -> None:
+    """With the colours, the samples in XYZ, and their squares."""
+    path = assets / f"native-moment-{rfilter}.xml"
+    integrator = f'<integrator type="moment">{NO_BSDF_SAMPLES}</integrator>'
+    lights, eye = parts.PANEL + SKY, parts.sensor(rfilter=rfilter)
+    path.write_text(parts.scene(GLOSSLESS, lights, eye, integrator))
+    prepared = prepare(path)
+    assert prepared.shading.path == "native"
+    result = prepared.render(seed=8)
+    mi.set_variant("llvm_ad_rgb")
+    expected = np.array(mi.render(mi.load_file(str(path), optimize=False), seed=8))
+    whole = np.concatenate([result.image, result.aovs["moment"]], axis=2)
+    assert expected.shape == whole.shape and expected.shape[2] == 9
+    differing = np.abs(whole - expected) > 1e-4 * np.abs(expected).max(axis=(0, 1))
+    assert np.count_nonzero(differing.any(axis=2)) <= 3
+    noise = whole[..., 6:] - whole[..., 3:6] ** 2
+    assert noise.min() > -1e-4 and noise.max() > 1e-3
