@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,24 +38,27 @@ class Element:
         for _, child in self.children:
             yield from child.walk()
 
-    def walk_new(self, seen: set[int]) -> Iterator[Element]:
-        """This element and all that it holds, without those whose `id` is in `seen`, which
-        grows by those that are passed."""
-        waiting = [self]
+    def __str__(self) -> str:
+        name = f"{self.kind} '{self.plugin}'"
+        if self.id:
+            name += f" with id '{self.id}'"
+        return f"{name} at {self.where}" if self.where else name
+
+
+def walk_once(roots: Iterable[Element]) -> Iterator[Element]:
+    """Some elements and all that they hold, each once, before what it holds."""
+    seen: set[int] = set()
+    for root in roots:
+        waiting = [root]
         while waiting:
             element = waiting.pop()
             if id(element) in seen:
                 continue
             seen.add(id(element))
             yield element
-            if element.children:
-                waiting += [child for _, child in reversed(element.children)]
-
-    def __str__(self) -> str:
-        name = f"{self.kind} '{self.plugin}'"
-        if self.id:
-            name += f" with id '{self.id}'"
-        return f"{name} at {self.where}" if self.where else name
+            for _, child in reversed(element.children):
+                if id(child) not in seen:
+                    waiting.append(child)
 
 
 KINDS = {

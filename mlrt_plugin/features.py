@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import mitsuba_objects as objects
-from .elements import Element
+from .elements import Element, walk_once
 from .errors import UnsupportedFeature
 from .materials import DELTA
 from .object_arrays import ANALYTIC_TYPES
@@ -57,14 +57,10 @@ NATIVE = {
 def used_elements(scene: Element, sensor: int) -> Iterator[Element]:
     """The elements that the image depends on: shapes, emitters, the chosen sensor, and what
     these hold. What is declared but never referred to is left out."""
-    seen: set[int] = set()
-    for kind in ("sensor", "shape", "emitter"):
-        for number, child in enumerate(scene.children_of(kind)):
-            if kind == "sensor" and number != sensor:
-                continue
-            if kind == "emitter" and child.plugin == "area":
-                continue  # it counts where a shape refers to it
-            yield from child.walk_new(seen)
+    sensors = [e for n, e in enumerate(scene.children_of("sensor")) if n == sensor]
+    # An area light counts where a shape refers to it.
+    lights = [e for e in scene.children_of("emitter") if e.plugin != "area"]
+    return walk_once([*sensors, *scene.children_of("shape"), *lights])
 
 
 def reason_against(element: Element) -> str:
