@@ -66,7 +66,7 @@ ON_MESHES = (
 REMARKS = {
     ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours and with native textures",
-    ("bsdf", "mask"): "of native materials; shadow rays "
+    ("bsdf", "mask"): "of native materials but another mask; shadow rays "
     "stop at it, and BSDF samples find lights behind it, as in `direct`",
     ("bsdf", "null"): "BSDF samples find lights behind it",
     **{("bsdf", plugin): NO_LIGHT_SAMPLE + OTHER_NOISE for plugin in SPECULAR},
@@ -84,10 +84,11 @@ REMARKS = {
     "other points than their density is of",
     ("emitter", "envmap"): "with `mis_compensation` and no BSDF samples without the light "
     "that is left to these, as in Mitsuba; a warning says so",
-    ("emitter", "spot"): "in constant colours, and without scale; else by Mitsuba",
-    ("emitter", "directional"): "without scale; else by Mitsuba",
-    ("sensor", "orthographic"): "without shear; else by Mitsuba",
-    ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
+    ("emitter", "spot"): "in constant colours, and without scale; else, which is rare, by "
+    "Mitsuba",
+    ("emitter", "directional"): "without scale; else, which is rare, by Mitsuba",
+    ("sensor", "orthographic"): "without shear; else, which is rare, by Mitsuba",
+    ("sampler", "orthogonal"): "of `strength` 2; else, which is rare, by Mitsuba",
     ("integrator", "direct"): "with up to 256 samples of emitters and of BSDFs natively; "
     "with more by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1, or 2, which is taken as `direct`; else "

@@ -105,8 +105,6 @@ def reason_against(element: Element) -> str:
         return "only arrays of strength 2 are supported so far"
     if plugin == "orthographic" and shears(element.properties.get("to_world")):
         return "its to_world shears, which is not supported yet"
-    if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
-        return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
         child.plugin not in ("diffuse", "conductor")
         for child in element.children_of("bsdf")

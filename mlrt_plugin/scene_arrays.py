@@ -114,6 +114,8 @@ class Film:
     filter: str = "gaussian"
     filter_radius: float = 2.0
     filter_stddev: float = 0.5
+    filter_b: float = 1 / 3
+    filter_c: float = 1 / 3
     sample_border: bool = False
 
 

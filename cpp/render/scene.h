@@ -147,6 +147,7 @@ struct Film {
     FilterType filter = FilterType::box;
     float filter_radius = 0.5f; // pixels; lanczos: also the number of its lobes
     float filter_stddev = 0.5f; // gaussian: pixels
+    float filter_b = 1.0f / 3, filter_c = 1.0f / 3; // mitchell
     bool sample_border = false; // also sample a border of the filter's radius
 };
 

@@ -111,12 +111,6 @@ UNSUPPORTED = {
             'type="orthogonal"><integer name="strength" value="3"/>',
         )
     },
-    "mitchell": {
-        "sensor": scene_files.SENSOR.replace(
-            '<rfilter type="box"/>',
-            '<rfilter type="mitchell"><float name="B" value="0.5"/></rfilter>',
-        )
-    },
     "homogeneous": {
         "shapes": '<shape type="cube"><medium type="homogeneous" name="interior"/></shape>'
     },
