@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import re
 from typing import Any
 
 import numpy as np
@@ -132,7 +133,10 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
 def mitchell_parameters(rfilter: Any) -> dict[str, float]:
     """B and C of a filter, which its description alone tells, with six digits; a third,
     the usual value, is taken to be one."""
-    shown = {name: float(objects.described(rfilter, name)) for name in ("B", "C")}
+    shown = {
+        name: float(value)
+        for name, value in re.findall(r"\b([BC])=([^\s,\]]+)", str(rfilter))
+    }
     return {
         f"filter_{name.lower()}": 1 / 3 if value == 0.333333 else value
         for name, value in shown.items()
