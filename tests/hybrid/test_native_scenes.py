@@ -31,6 +31,10 @@ COMPENSATED = SKY.replace(
 CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 
 
+NEVER_CHOSEN = parts.PANEL.replace(
+    '<emitter type="area">',
+    '<emitter type="area"><float name="sampling_weight" value="0"/>',
+)
 WIDE_VIEW = parts.VIEW.replace("<lookat", '<scale x="2.5" y="2.2"/><lookat')
 LENS = parts.number("aperture_radius", 0.2) + parts.number("focus_distance", 5.5)
 SHUTTER = parts.number("shutter_open", 0.1) + parts.number("shutter_close", 0.6)
@@ -73,6 +77,12 @@ SCENES = {
         lights=projector(BOARD, parts.number("scale", 20)) + parts.PANEL + parts.LAMP
     ),
     "constant": scene(lights=CONSTANT + parts.LAMP),
+    "area light that is never chosen": scene(
+        lights=parts.LAMP
+        + NEVER_CHOSEN
+        + '<emitter type="spot"><transform name="to_world"><lookat origin="-2, 4, 3" '
+        'target="0, 0, 0" up="0, 1, 0"/></transform></emitter>'
+    ),
     "envmap among lights": scene(lights=parts.PANEL + SKY + parts.LAMP),
     "thinlens": scene(eye=parts.sensor("thinlens", LENS)),
     "orthographic": scene(eye=parts.sensor("orthographic", view=WIDE_VIEW)),
