@@ -102,9 +102,8 @@ public:
         for (int k = 0; k < 3; ++k) {
             const float reciprocal = scaled_.reciprocal[k];
             axes_[k] = {ray.origin[k], reciprocal, std::signbit(reciprocal)};
-            interval_ =
-                clip_to_slab(interval_, entry.cell.lo[k] - ray.origin[k],
-                             entry.cell.hi[k] - ray.origin[k], reciprocal);
+            interval_ = clip_to_slab(interval_, entry.cell.lo[k] - ray.origin[k],
+                                     entry.cell.hi[k] - ray.origin[k], reciprocal);
         }
         pending_ = 0;
         node_ = entry.node;
