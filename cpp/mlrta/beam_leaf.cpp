@@ -2,6 +2,7 @@
 
 #include "geometry/triangle_test.h"
 #include "mlrta/beam_triangle_tests.h"
+#include "mlrta/parallel_walk.h"
 #include "traverse/parameter_interval.h"
 
 #include <algorithm>
@@ -223,10 +224,19 @@ bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &f
     bool done = true;
     if (memory.occluder_count > 0)
         tests.test_first({memory.occluders.data(), memory.occluder_count});
-    if (!tests.all_done()) {
-        BeamWalk<query> walk(tree, beam, tests, counters);
+    const auto take_through = [&](auto walk) {
         for (uint32_t i = 0; i < frontier.count && done; ++i)
             done = walk.walk(frontier.entries[i]);
+    };
+    if (!tests.all_done()) {
+        if constexpr (query == Query::any) {
+            if (beam.parallel)
+                take_through(ParallelWalk(tree, beam, tests, counters));
+            else
+                take_through(BeamWalk<query>(tree, beam, tests, counters));
+        } else {
+            take_through(BeamWalk<query>(tree, beam, tests, counters));
+        }
     }
     std::ranges::copy(tests.hit(), memory.occluders.begin());
     memory.occluder_count = uint32_t(tests.hit().size());

@@ -44,7 +44,8 @@ FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
 } // namespace
 
 // The axis along which the ray in the middle of those that are active moves most.
-bool BeamPackets::choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count) {
+std::optional<uint32_t> BeamPackets::choose_axis(const RayGroup &rays, uint32_t first,
+                                                 uint32_t ray_count) {
     for (uint32_t n = 0; n < ray_count; ++n) {
         const uint32_t i = first + (n + ray_count / 2) % ray_count;
         const Vec3f d{rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
@@ -55,9 +56,9 @@ bool BeamPackets::choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray
         const int k = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
         axes = {(k + 1) % 3, (k + 2) % 3, k};
         side = d[k] > 0 ? 1.0f : -1.0f;
-        return true;
+        return i;
     }
-    return false;
+    return std::nullopt;
 }
 
 FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
@@ -242,6 +243,7 @@ void BeamPackets::fit_rectangle() {
 
 void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
                        const CameraMap *camera) {
+    parallel = false;
     origin = rays.common_origin;
     count = 0;
     any_active = any_stray = false;

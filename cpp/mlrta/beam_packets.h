@@ -1,11 +1,15 @@
-// The rays of a beam with a common origin, projected along the beam's main axis: what the
-// beam-leaf traversal tests triangles against.
+// The rays of a beam with a common origin or a common direction, projected along the beam's
+// main axis: what the beam-leaf traversal tests triangles against.
 //
-// With k the main axis and i, j the two that follow it cyclically, the direction of a ray
-// is |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i / |d_k| and v = d_j
-// / |d_k|; side is the sign that all d_k share. What is linear in the direction is |d_k|
-// times something linear in (u, v), and so is one over the depth z = t |d_k| at which a
-// plane is met.
+// Common origin: with k the main axis and i, j the two that follow it cyclically, the
+// direction of a ray is |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i
+// / |d_k| and v = d_j / |d_k|; side is the sign that all d_k share. What is linear in the
+// direction is |d_k| times something linear in (u, v), and so is one over the depth z = t
+// |d_k| at which a plane is met.
+//
+// Common direction, but for rounding: with x relative to a point of the beam, u = x_i -
+// slope_u z and v = x_j - slope_v z with z = side x_k are the same along a ray, and -z is
+// linear in (u, v) on a plane. What is said of reciprocal depths holds for -z then.
 #pragma once
 
 #include "base/simd.h"
@@ -14,6 +18,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 namespace mlrt {
 
@@ -56,7 +61,8 @@ struct BeamPackets {
     static constexpr uint32_t CAPACITY = RUNS * PACKET_WIDTH;
     static constexpr uint32_t MAX_RAYS = CAPACITY * PACKET_WIDTH;
 
-    Vec3f origin;
+    bool parallel;           // whether the rays have a common direction, else origin
+    Vec3f origin;            // the common one, or a point that coordinates are relative to
     std::array<int, 3> axes; // i, j, k
     float side;
     uint32_t count; // of packets
@@ -67,6 +73,18 @@ struct BeamPackets {
     SlopeRectangle rectangle; // holds the slopes of all active rays
     float slope_lo[2], slope_hi[2];
     float greatest_sum; // of 1 + |u| + |v| in the rectangle
+
+    // Of parallel rays: the common slopes and how far those of a ray may deviate from them;
+    // the greatest coordinate of an origin, and how far u and v may be from what they are
+    // there.
+    float slope_u, slope_v, deviation;
+    float origin_reach, origin_error;
+    // What a ray hits at more than `greatest` lies behind its t_min for certain, at less
+    // than `least` it does not.
+    struct Begin {
+        FloatPacket least, greatest;
+    };
+    std::array<Begin, CAPACITY> begins; // of parallel packets
 
     // Bounds of sixteen packets side by side, as RayBounds has them, and of all sixteen.
     struct Run {
@@ -84,6 +102,19 @@ struct BeamPackets {
     void load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
               const CameraMap *camera);
 
+    // The same for rays with a common direction in a scene with the given bounds. Rays that
+    // go another way are strays, or all of them if too little is certain of where they are.
+    void load_parallel(const RayGroup &rays, uint32_t first, uint32_t ray_count,
+                       const Box3f &scene);
+
+    // How far u and v of a parallel ray may be from those of the packet at points that have
+    // no greater coordinate than `reach`.
+    template <typename Real>
+    Real uncertainty(const Real &reach) const {
+        return fused(reach + Real(origin_reach), Real(1.01f * deviation),
+                     Real(origin_error));
+    }
+
     // Coordinates p and q of a packet's rays, to within the rectangle's slack.
     FloatPacket along_p(const BeamPacket &packet) const {
         return fused(packet.u - rectangle.center_u, FloatPacket(rectangle.cosine),
@@ -95,9 +126,15 @@ struct BeamPackets {
     }
 
 private:
-    bool choose_axis(const RayGroup &rays, uint32_t first, uint32_t ray_count);
+    // Returns the ray that it was chosen by, if any is active.
+    std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
+                                        uint32_t ray_count);
     // Returns the depths at which rays begin, or zero where they are not active.
     FloatPacket load_packet(const RayGroup &rays, uint32_t last, BeamPacket &packet) const;
+    FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last,
+                                     BeamPacket &packet, Begin &begin,
+                                     FloatPacket &reach) const;
+    void set_all_apart();
     void turn_as_film(const CameraMap &camera);
     void turn_as_rays();
     void fit_rectangle();

@@ -1,5 +1,6 @@
-// Takes beams of a group with a common origin from a frontier to their answers: by X4 as
-// far as it pays, after regrouping rays that leave gaps, and by packets (X2) for the rest.
+// Takes beams of a group with a common origin or a common direction from a frontier to
+// their answers: by X4 as far as it pays, after regrouping rays that leave gaps, and by
+// packets (X2) for the rest.
 #pragma once
 
 #include "base/exactness.h"
@@ -11,7 +12,9 @@
 
 namespace mlrt {
 
-template <typename Output>
+// Origin tells which: CommonOrigin, or LaneOrigins for a common direction, of Query::any
+// only.
+template <typename Origin, typename Output>
 class BeamTracer {
 public:
     // Measured on office, conference, sponza and building: a beam visits each node once for
@@ -41,6 +44,8 @@ public:
     }
 
 private:
+    static constexpr bool PARALLEL = std::is_same_v<Origin, LaneOrigins>;
+
     // A large beam shares the walk, and what is made of each triangle, by more rays: it
     // pays for a camera's rays, and for others that are as close to each other.
     static constexpr uint32_t LARGE_BEAM = BeamPackets::MAX_RAYS;
@@ -51,7 +56,10 @@ private:
     void trace_beam(uint32_t first, uint32_t count, const Frontier &frontier,
                     bool ordered) {
         BeamPackets &beam = beam_;
-        beam.load(rays_, first, count, camera_);
+        if constexpr (PARALLEL)
+            beam.load_parallel(rays_, first, count, tree_.bounds);
+        else
+            beam.load(rays_, first, count, camera_);
         if (!beam.any_active) {
             trace_strays(frontier);
             return;
@@ -236,7 +244,7 @@ private:
     Output output_;
     Counters &counters_;
     BeamMemory &memory_;
-    PacketTracer<CommonOrigin, Output> packets_;
+    PacketTracer<Origin, Output> packets_;
     BeamPackets &beam_;    // kept by the memory, since regrouped rays need it no more
     uint32_t regroupings_; // that these rays come from
 };

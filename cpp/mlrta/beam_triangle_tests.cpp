@@ -4,6 +4,7 @@
 #include "geometry/triangle_test.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
+#include "traverse/single.h"
 
 #include <algorithm>
 #include <bit>
@@ -117,7 +118,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
                        lane = pairs_[i] / BeamPackets::CAPACITY;
-        const LaneBits found = test_packet(beam_.packets[n], forms, lane, numbers[lane]);
+        const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
     }
@@ -133,8 +134,9 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
 
 // One triangle against sixteen rays. Returns whether they found something.
 template <Query query>
-bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleForms &forms,
+bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
                                            uint32_t lane, uint32_t primitive) {
+    BeamPacket &packet = beam_.packets[number];
     const auto value = [&](int form) {
         return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
                      fused(packet.v, FloatPacket(forms.of_v[form][lane]),
@@ -148,10 +150,14 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
     const FloatPacket lowest =
         EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
     const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-    const auto possible = (highest >= packet.least) & (smallest >= -edge_error);
+    auto possible = (highest >= packet.least) & (smallest >= -edge_error);
+    FloatPacket begin(beam_.nearest);
+    if (query == Query::any && beam_.parallel) {
+        begin = beam_.begins[number].least;
+        possible &= lowest <= beam_.begins[number].greatest;
+    }
     const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
-    const auto nearer =
-        possible & certain & (lowest > packet.greatest) & (highest < beam_.nearest);
+    const auto nearer = possible & certain & (lowest > packet.greatest) & (highest < begin);
     const LaneBits found = to_bits(nearer);
     packet.found |= found;
     if constexpr (query == Query::any) {
@@ -172,6 +178,10 @@ bool BeamTriangleTests<query>::test_packet(BeamPacket &packet, const TriangleFor
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                                       LaneBits certain_hits, uint32_t primitive) {
+    if (query == Query::any && beam_.parallel) {
+        decide_parallel(packet, lanes, certain_hits, primitive);
+        return;
+    }
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
     for_each_value(packet.primitive, lanes & packet.found,
@@ -237,6 +247,30 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
         select(mask, FloatPacket((1 + 0x1p-21) / (distance * main)), packet.greatest);
 }
 
+// The same for rays that each have an origin, of Query::any.
+template <Query query>
+void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lanes,
+                                               LaneBits certain_hits, uint32_t primitive) {
+    counters_.double_tests += uint64_t(std::popcount(lanes));
+    const Triangle &triangle = tree_.triangles[primitive];
+    LaneBits hits = 0;
+    for_each_lane(lanes, [&](uint32_t lane) {
+        const Ray ray = ray_of(rays_, packet.first_ray + lane);
+        if ((certain_hits >> lane & 1) == 0) {
+            const HitDecision decision = decide_hit(ray.origin, ray.direction, triangle);
+            counters_.exact_tests += decision.precision == Precision::exact;
+            if (!decision.hit)
+                return;
+        }
+        const float t = hit_distance(ray.origin, ray.direction, triangle);
+        hits |= LaneBits(t > std::max(ray.t_min, 0.0f) && t <= ray.t_max && t < INFINITE)
+                << lane;
+    });
+    packet.found |= hits;
+    packet.least =
+        select(from_bits<FloatPacket>(hits), FloatPacket(INFINITE), packet.least);
+}
+
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
@@ -269,7 +303,7 @@ void BeamTriangleTests<query>::update_least() {
     least_ = INFINITY;
     for (uint32_t n = 0; n < beam_.run_count(); ++n)
         least_ = std::min(least_, beam_.runs[n].all.least);
-    far_end_ = (1 + 4 * FLOAT_ROUNDOFF) / least_;
+    far_end_ = beam_.parallel ? -least_ : (1 + 4 * FLOAT_ROUNDOFF) / least_;
 }
 
 template class BeamTriangleTests<Query::closest>;

@@ -49,11 +49,13 @@ public:
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
-    bool test_packet(BeamPacket &packet, const TriangleForms &forms, uint32_t lane,
+    bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
     void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                 uint32_t primitive);
+    void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+                         uint32_t primitive);
     void update_least(uint64_t packets);
     void update_least();
 

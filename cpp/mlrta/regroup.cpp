@@ -138,6 +138,8 @@ RegroupedRays::RegroupedRays(const RayGroup &rays, const RayNumbers &numbers)
                    UIntPacket(numbers.number[0]));
         for (int k = 0; k < 3; ++k)
             store(&direction[k][i], gather(rays.direction[k], from));
+        for (int k = 0; k < 3 && !rays.has_common_origin; ++k)
+            store(&origin[k][i], gather(rays.origin[k], from));
         store(&t_min[i], gather(rays.t_min, from));
         store(&t_max[i], gather(rays.t_max, from));
         store(&number[i], from);
@@ -147,8 +149,11 @@ RegroupedRays::RegroupedRays(const RayGroup &rays, const RayNumbers &numbers)
 RayGroup RegroupedRays::group(const RayGroup &from) {
     RayGroup group = from;
     group.count = count;
-    for (int k = 0; k < 3; ++k)
+    for (int k = 0; k < 3; ++k) {
         group.direction[k] = direction[k].data();
+        if (!from.has_common_origin)
+            group.origin[k] = origin[k].data();
+    }
     group.t_min = t_min.data();
     group.t_max = t_max.data();
     if (from.cost) {

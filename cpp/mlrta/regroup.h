@@ -58,6 +58,7 @@ private:
 // Rays in an order of their own, and their numbers in the group that they are taken from.
 struct RegroupedRays {
     std::array<std::array<float, RayNumbers::CAPACITY>, 3> direction;
+    std::array<std::array<float, RayNumbers::CAPACITY>, 3> origin; // unless it is common
     std::array<float, RayNumbers::CAPACITY> t_min, t_max;
     std::array<float, RayNumbers::CAPACITY> cost;
     std::array<uint32_t, RayNumbers::CAPACITY> number;
@@ -65,7 +66,7 @@ struct RegroupedRays {
 
     RegroupedRays(const RayGroup &rays, const RayNumbers &numbers);
 
-    // They alone, with the origin of the group that they are from.
+    // They alone, with the common origin of the group that they are from, if it has one.
     RayGroup group(const RayGroup &from);
 
     // What they took, if the group that they are from keeps account of it.

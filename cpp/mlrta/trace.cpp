@@ -3,6 +3,7 @@
 #include "mlrta/beam_tracer.h"
 #include "mlrta/frontier.h"
 #include "mlrta/packet_tracer.h"
+#include "mlrta/parallel_rays.h"
 #include "mlrta/ray_cost.h"
 #include "mlrta/tile.h"
 
@@ -124,14 +125,22 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &a
         TileTracer(tree, rays, options, tile, runs, counters).trace();
     };
     output.clear(rays.count);
+    const bool beams = options.traversal == Traversal::beam_leaf ||
+                       options.traversal == Traversal::adaptive;
     if (!rays.has_common_origin) {
+        if constexpr (Output::query == Query::any)
+            if (beams && are_parallel(rays)) {
+                BeamMemory memory(tree, {});
+                trace_runs(BeamTracer<LaneOrigins, Output>(tree, rays, options, nullptr,
+                                                           output, counters, memory));
+                return;
+            }
         trace_runs(
             PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
-    } else if (options.traversal == Traversal::beam_leaf ||
-               options.traversal == Traversal::adaptive) {
+    } else if (beams) {
         BeamMemory memory(tree, rays.common_origin);
-        trace_runs(BeamTracer<Output>(tree, rays, options, tile ? &tile->camera : nullptr,
-                                      output, counters, memory));
+        trace_runs(BeamTracer<CommonOrigin, Output>(
+            tree, rays, options, tile ? &tile->camera : nullptr, output, counters, memory));
     } else {
         trace_runs(
             PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));

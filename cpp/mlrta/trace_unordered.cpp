@@ -1,5 +1,6 @@
 #include "mlrta/trace_unordered.h"
 
+#include "mlrta/parallel_rays.h"
 #include "mlrta/ray_order.h"
 
 #include <algorithm>
@@ -88,7 +89,7 @@ void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options))
+    if (may_be_sorted(rays, options) && !are_parallel(rays))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_any(tree, rays, options, occluded, counters);

@@ -8,6 +8,9 @@
 // N = (b - a) x (c - a). Divided by a.N, whose sign is theirs wherever t > 0, all three
 // volumes are >= 0 if and only if the ray hits.
 //
+// For parallel rays the volumes are areas in the plane of (u, v), linear as well, and -z is
+// one; all are divided by the area of the triangle.
+//
 // The forms are evaluated in single precision with bounds on their error: they say what is
 // certain. The rest is decided exactly.
 #pragma once
@@ -61,6 +64,10 @@ private:
     template <typename Real>
     void set_block(const BeamPackets &beam, float least, const Triangle *triangles,
                    const uint32_t *numbers, uint32_t count);
+
+    template <typename Real>
+    void set_parallel_block(const BeamPackets &beam, float least, const Triangle *triangles,
+                            const uint32_t *numbers, uint32_t count);
 
     bool wide_ = false; // whether there are more than a narrow block
 };

@@ -1,0 +1,190 @@
+// Triangles as a beam of parallel rays sees them.
+#include "geometry/triangle_block.h"
+#include "geometry/triangle_test.h"
+#include "mlrta/triangle_forms.h"
+#include "traverse/parameter_interval.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mlrt {
+
+namespace {
+
+// What exceeds it might overflow on the way to a form, what falls below might lose digits
+// to underflow.
+constexpr float LARGEST_BOUND = 0x1p80f, SMALLEST_AREA = 0x1p-100f;
+
+// Bounds on errors, in units of roundoff.
+//
+// Let l be the greatest |u| or |v| of a vertex, h that of the beam's rays, s the greatest
+// coordinate relative to the beam and e that of an edge, sheared ones included. Vertices,
+// edges, areas and planes come from double precision: with 8 roundings of s or e in a
+// vertex or an edge, areas are good to 64 roundings of e^2, constants of edges to 64 of s
+// e, and those of planes to 64 of s e^2.
+constexpr double DOUBLE_ROUNDINGS = 64 * DOUBLE_ROUNDOFF;
+// Edges: coefficients are rounded twice, to single precision and by the product with the
+// reciprocal of the area, a form over a rectangle is evaluated with less than 16 roundings
+// (see triangle_forms.cpp), of at most 2 (l + h) e each. That is 36 (l + h) e; 48 covers
+// products of roundings and the bound itself.
+constexpr float EDGE_ROUNDINGS = 48 * FLOAT_ROUNDOFF;
+// Depth: the same roundings of the sum of its three terms.
+constexpr float PLANE_ROUNDINGS = 24 * FLOAT_ROUNDOFF;
+// What is certain of the area: that no more than this share of it is error.
+constexpr float LARGEST_SHARE = 0.25f;
+
+template <typename Real>
+Real largest_component(const Vec3<Real> &v) {
+    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
+}
+
+template <typename Real>
+Vec3<Real> in_single(const Vec3<DoubleOf<Real>> &v) {
+    return {Real(v.x), Real(v.y), Real(v.z)};
+}
+
+} // namespace
+
+template <typename Real>
+void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
+                                       const Triangle *triangles, const uint32_t *numbers,
+                                       uint32_t count) {
+    using Double = DoubleOf<Real>;
+    const TriangleBlock<Real> block(triangles, numbers);
+    const auto [i, j, k] = beam.axes;
+    const auto in_order = [&](const Vec3<Real> &v) -> Vec3<Double> {
+        return {Double(v[i]), Double(v[j]), Double(v[k])};
+    };
+    // (u, v, z) of a vector.
+    const auto sheared = [&](const Vec3<Double> &v) -> Vec3<Double> {
+        const Double z = v.z * double(beam.side);
+        return {fused(z, Double(-double(beam.slope_u)), v.x),
+                fused(z, Double(-double(beam.slope_v)), v.y), z};
+    };
+    const Vec3<Double> va = in_order(block.a), vb = in_order(block.b),
+                       vc = in_order(block.c);
+    const Vec3<Double> o{Double(double(beam.origin[i])), Double(double(beam.origin[j])),
+                         Double(double(beam.origin[k]))};
+    const Vec3<Double> a = sheared(va - o), b = sheared(vb - o), c = sheared(vc - o);
+    const Vec3<Double> ab = sheared(vb - va), bc = sheared(vc - vb), ca = sheared(va - vc);
+    const Vec3<Double> normal = cross(ca, ab);
+    const Double plane = dot(a, normal);
+
+    const Real area(normal.z);
+    const Real inverse = 1.0f / area, inverse_size = absolute(inverse);
+    const Vec3<Real> fa = in_single<Real>(a), fb = in_single<Real>(b),
+                     fc = in_single<Real>(c);
+    const Vec3<Real> edges[3] = {in_single<Real>(bc), in_single<Real>(ca),
+                                 in_single<Real>(ab)};
+    const Real size = maximum(largest_component(fa),
+                              maximum(largest_component(fb), largest_component(fc)));
+    const Real edge =
+        maximum(largest_component(edges[0]),
+                maximum(largest_component(edges[1]), largest_component(edges[2])));
+    const auto along = [](const Vec3<Real> &v) {
+        return maximum(absolute(v.x), absolute(v.y));
+    };
+    const Real local = maximum(along(fa), maximum(along(fb), along(fc)));
+    const Real rays(std::max(std::max(-beam.slope_lo[0], beam.slope_hi[0]),
+                             std::max(-beam.slope_lo[1], beam.slope_hi[1])));
+    const Real share =
+        float(DOUBLE_ROUNDINGS) * (edge * edge) * inverse_size + 2 * FLOAT_ROUNDOFF;
+    const Real uncertainty = beam.uncertainty(size);
+    const Real edge_bound = (EDGE_ROUNDINGS * (local + rays) + 2.0f * uncertainty +
+                             float(DOUBLE_ROUNDINGS) * size) *
+                            edge * inverse_size;
+    const MaskOf<Real> safe = (absolute(area) > SMALLEST_AREA) & (share <= LARGEST_SHARE) &
+                              (edge_bound < LARGEST_BOUND);
+    const LaneBits given = (1u << count) - 1;
+    const LaneBits safe_bits = to_bits(safe) & given;
+    unsafe = given & ~safe_bits;
+    possible = 0;
+    if (safe_bits == 0)
+        return;
+    store(edge_error, edge_bound);
+
+    const SlopeRectangle &rectangle = beam.rectangle;
+    const Real center_u(rectangle.center_u), center_v(rectangle.center_v);
+    const Real cosine(rectangle.cosine), sine(rectangle.sine);
+    const Real half_p(rectangle.half_p), half_q(rectangle.half_q);
+    MaskOf<Real> inside = safe;
+
+    // Where the vertices lie in the rectangle: two roundings and what double precision
+    // leaves, a difference, two products and a sum, and the middle and extent of all.
+    Real lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
+    for (const Vec3<Real> *vertex : {&fa, &fb, &fc}) {
+        const Real du = vertex->x - center_u, dv = vertex->y - center_v;
+        const Real p = fused(du, cosine, dv * sine);
+        const Real q = fused(dv, cosine, -(du * sine));
+        lo_p = minimum(p, lo_p);
+        hi_p = maximum(p, hi_p);
+        lo_q = minimum(q, lo_q);
+        hi_q = maximum(q, hi_q);
+    }
+    const Real slack = (32 * FLOAT_ROUNDOFF) * (local + rays) +
+                       float(DOUBLE_ROUNDINGS) * size + 2.0f * uncertainty;
+    const Real middle_p = 0.5f * (lo_p + hi_p), middle_q = 0.5f * (lo_q + hi_q);
+    const Real extent_p = 0.5f * (hi_p - lo_p) + slack;
+    const Real extent_q = 0.5f * (hi_q - lo_q) + slack;
+    inside &= (absolute(middle_p) <= extent_p + half_p) &
+              (absolute(middle_q) <= extent_q + half_q);
+    possible = to_bits(inside) & safe_bits;
+    if (possible == 0)
+        return;
+    store(box_p, middle_p);
+    store(box_q, middle_q);
+    store(box_half_p, extent_p);
+    store(box_half_q, extent_q);
+
+    const Vec3<Double> *vertices[3] = {&b, &c, &a};
+    const Vec3<Double> *directions[3] = {&bc, &ca, &ab};
+    Real greatest;
+    for (int form = 0; form < 4; ++form) {
+        Real form_1, form_u, form_v;
+        if (form == DEPTH) {
+            form_1 = -Real(plane) * inverse;
+            form_u = Real(normal.x) * inverse;
+            form_v = Real(normal.y) * inverse;
+        } else {
+            const Vec3<Double> &p = *vertices[form], &d = *directions[form];
+            form_1 = Real(p.x * d.y - p.y * d.x) * inverse;
+            form_u = -edges[form].y * inverse;
+            form_v = edges[form].x * inverse;
+        }
+        const Real middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
+        const Real form_p = fused(form_u, cosine, form_v * sine);
+        const Real form_q = fused(form_v, cosine, -(form_u * sine));
+        greatest = middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
+        if (form == DEPTH) {
+            // The area's error acts on a depth of at most the size.
+            const Real slopes = absolute(form_u) + absolute(form_v);
+            const Real error =
+                2.0f * (PLANE_ROUNDINGS * fused(slopes, rays, absolute(form_1)) +
+                        slopes * uncertainty + 2.0f * (share * size));
+            store(depth_error, error);
+            store(depth_grow, Real(1.0f));
+            store(depth_shrink, Real(1.0f));
+            inside &= greatest + error >= least;
+        } else {
+            inside &= greatest >= -edge_bound;
+        }
+        store(constant[form], form_1);
+        store(of_u[form], form_u);
+        store(of_v[form], form_v);
+        store(center[form], middle);
+        store(of_p[form], form_p);
+        store(of_q[form], form_q);
+    }
+    possible = to_bits(inside) & safe_bits;
+}
+
+template void TriangleForms::set_parallel_block<FloatBlock>(const BeamPackets &, float,
+                                                            const Triangle *,
+                                                            const uint32_t *, uint32_t);
+#if defined(__AVX512F__)
+template void TriangleForms::set_parallel_block<FloatWide>(const BeamPackets &, float,
+                                                           const Triangle *,
+                                                           const uint32_t *, uint32_t);
+#endif
+
+} // namespace mlrt
