@@ -165,3 +165,33 @@ def test_beams_are_made_of_rays_to_a_directional_light(core: ModuleType) -> None
     ), SEED
     assert counters["beams"] > 0
     assert counters["traversal_steps"] < counters["beam_steps"]
+
+
+@each_core
+@pytest.mark.parametrize("offset", [0.0, 1e3], ids=["at the centre", "far away"])
+def test_parallel_rays_at_vertices_and_edges(core: ModuleType, offset: float) -> None:
+    """Rays through points that bounds must leave open, sorted so that beams are narrow."""
+    rng = np.random.default_rng(SEED)
+    tested = 0
+    for name, scene in workloads.scenes(rng).items():
+        vertices, faces = workloads.moved(scene, offset)
+        tree = build(core, (vertices, faces))
+        extent = np.ptp(vertices, axis=0).max()
+        for components in DIRECTIONS.values():
+            direction = np.array(components, np.float32)
+            weights = rng.choice([0, 0, 0.5, 1], (600, 3))
+            weights[weights.sum(axis=1) == 0] = 1
+            weights /= weights.sum(axis=1, keepdims=True)
+            corners = vertices[faces[rng.integers(0, len(faces), 600)]]
+            targets = np.einsum("nk,nkj->nj", weights, corners)
+            before = rng.choice([0, 1e-4, 0.5]) * extent / np.abs(direction).max()
+            origins = (targets - before * direction).astype(np.float32)
+            origins = origins[np.argsort(origins @ rng.normal(0, 1, 3))]
+            origins, along = _rays_along(direction, origins)
+            rays = origins, NOISE["but for rounding"](rng, along)
+            counters: dict[str, int] = {}
+            found = tree.any_hit(*rays, *interval(rays, 0, np.inf), BEAM_LEAF, counters)
+            expected = occluded(tree, rays, BRUTE_FORCE)
+            assert np.array_equal(np.asarray(found, bool), expected), (name, SEED)
+            tested += counters["beams"]
+    assert tested > 100
