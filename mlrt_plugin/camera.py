@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import os
+import re
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,6 @@ from .scene_arrays import Camera, Film
 
 LARGEST_RADIUS = 64
 """Pixels that a reconstruction filter may reach; chosen, far above any in use."""
-USUAL_MITCHELL = "B=0.333333, C=0.333333"
-"""In the description of a filter with the parameters of the paper."""
 BYTES_PER_PIXEL = 64
 """Of colours and AOVs, twice each while they are summed up; measured."""
 
@@ -102,11 +101,6 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
             f"rfilter '{kind}' of {name} is not supported: only {', '.join(FILTERS)} are "
             "so far"
         )
-    if kind == "mitchell" and USUAL_MITCHELL not in str(rfilter):
-        raise UnsupportedFeature(
-            f"rfilter 'mitchell' of {name} is not supported: only its usual parameters B "
-            "and C are so far"
-        )
     radius = float(rfilter.radius())
     if not 0 < radius <= LARGEST_RADIUS:
         raise SceneError(
@@ -130,9 +124,23 @@ def read_film(film: Any, name: str) -> tuple[Film, list[str]]:
             # Mitsuba cuts its Gaussian off at four standard deviations (gaussian.cpp).
             filter_stddev=radius / 4 if kind == "gaussian" else 0.5,
             sample_border=bool(film.sample_border()),
+            **(mitchell_parameters(rfilter) if kind == "mitchell" else {}),
         ),
         warnings,
     )
+
+
+def mitchell_parameters(rfilter: Any) -> dict[str, float]:
+    """B and C of a filter, which its description alone tells, with six digits; a third,
+    the usual value, is taken to be one."""
+    shown = {
+        name: float(value)
+        for name, value in re.findall(r"\b([BC])=([^\s,\]]+)", str(rfilter))
+    }
+    return {
+        f"filter_{name.lower()}": 1 / 3 if value == 0.333333 else value
+        for name, value in shown.items()
+    }
 
 
 def check_size(width: int, height: int, name: str) -> None:

@@ -52,42 +52,50 @@ PLUGINS = {
     ),
 }
 """All plugins of Mitsuba, by the kind of object that they make."""
-NO_LIGHT_SAMPLE = (
-    "black for light samples; BSDF samples find lights in it, by Mitsuba if it is textured"
-)
+NO_LIGHT_SAMPLE = "black for light samples; BSDF samples find lights in it"
 OTHER_NOISE = "; with samplers but `independent` and light samples too, of other noise"
 HIT_BY_MITSUBA = "where Mitsuba shades, it also finds the hits"
-ON_MATERIALS = "on materials of all native shapes, and as `radiance` of rectangles"
-ON_MESHES = "on materials of meshes that are not instanced; else by Mitsuba"
+ON_MATERIALS = (
+    "on materials of all native shapes, as `radiance` where that is native, and as "
+    "`irradiance` of `projector`"
+)
+ON_MESHES = (
+    "on materials of meshes that are not instanced; else by Mitsuba, where as `radiance` "
+    "it has the fault of textures on meshes, see `area`"
+)
 REMARKS = {
     ("bsdf", "twosided"): "of `diffuse` and `conductor`; with others by Mitsuba",
     ("bsdf", "diffuse"): "in constant colours and with native textures",
-    ("bsdf", "mask"): "of native materials; shadow rays "
+    ("bsdf", "mask"): "of native materials but another mask; shadow rays "
     "stop at it, and BSDF samples find lights behind it, as in `direct`",
     ("bsdf", "null"): "BSDF samples find lights behind it",
     **{("bsdf", plugin): NO_LIGHT_SAMPLE + OTHER_NOISE for plugin in SPECULAR},
-    ("bsdf", "conductor"): NO_LIGHT_SAMPLE,
+    ("bsdf", "conductor"): NO_LIGHT_SAMPLE + ", by Mitsuba if `eta` or `k` has a texture",
     **{("texture", plugin): ON_MATERIALS for plugin in LIGHT_TEXTURES},
     ("texture", "mesh_attribute"): ON_MESHES,
     ("emitter", "area"): f"in constant colours, and with {' and '.join(LIGHT_TEXTURES)} "
-    "textures on rectangles that are not flipped; else by Mitsuba. On meshes it depends on "
-    "Embree which of the faces at a point of the texture glows; of flipped rectangles "
-    "Mitsuba's emitter samples take the other side to glow than its BSDF samples",
-    ("emitter", "envmap"): "without `mis_compensation`; else by Mitsuba",
-    ("emitter", "spot"): "in constant colours, and without scale; else by Mitsuba",
-    ("emitter", "directional"): "without scale; else by Mitsuba",
-    ("emitter", "projector"): "not modelled; Mitsuba's shading gives the same image in 3 "
-    "times the time of native shading (median of the scenes in `compare/results/scenes.md` "
-    "that both render)",
-    ("sensor", "orthographic"): "without shear; else by Mitsuba",
-    ("sampler", "orthogonal"): "of `strength` 2; else by Mitsuba",
+    "textures on `rectangle`, `sphere`, `disk` and `cylinder`. Left to Mitsuba are "
+    "textures where its own samples do not agree, so that there is no right image to "
+    "match: meshes, "
+    "of which emitter samples light one of the faces that share a point of the texture, "
+    "whichever Embree finds (of a cube one of six), and BSDF samples all; flipped "
+    "rectangles, of which emitter samples take the other side to glow than BSDF samples; "
+    "and spheres and cylinders that are turned, of which emitter samples take light from "
+    "other points than their density is of",
+    ("emitter", "envmap"): "with `mis_compensation` and no BSDF samples without the light "
+    "that is left to these, as in Mitsuba; a warning says so",
+    ("emitter", "spot"): "in constant colours, and without scale; else, which is rare, by "
+    "Mitsuba",
+    ("emitter", "directional"): "without scale; else, which is rare, by Mitsuba",
+    ("sensor", "orthographic"): "without shear; else, which is rare, by Mitsuba",
+    ("sampler", "orthogonal"): "of `strength` 2; else, which is rare, by Mitsuba",
     ("integrator", "direct"): "with up to 256 samples of emitters and of BSDFs natively; "
     "with more by Mitsuba",
     ("integrator", "path"): "with `max_depth` 1, or 2, which is taken as `direct`; else "
     "`--force-direct`",
     ("integrator", "aov"): f"of {', '.join(f'`{name}`' for name in AOV_NAMES)}; else "
     "`--force-direct`",
-    ("integrator", "moment"): "by Mitsuba, around one `direct` or `path` with `max_depth` "
+    ("integrator", "moment"): "around one `direct` or `path` with `max_depth` "
     "2; else `--force-direct`",
     ("shape", "shapegroup"): "a tree of its own; where Mitsuba shades, see `instance`",
     ("shape", "instance"): "where Mitsuba shades, of meshes it is written out into the "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -38,23 +38,27 @@ class Element:
         for _, child in self.children:
             yield from child.walk()
 
-    def walk_new(self, seen: set[int]) -> Iterator[Element]:
-        """This element and all that it holds, without those whose `id` is in `seen`, which
-        grows by those that are passed."""
-        waiting = [self]
+    def __str__(self) -> str:
+        name = f"{self.kind} '{self.plugin}'"
+        if self.id:
+            name += f" with id '{self.id}'"
+        return f"{name} at {self.where}" if self.where else name
+
+
+def walk_once(roots: Iterable[Element]) -> Iterator[Element]:
+    """Some elements and all that they hold, each once, before what it holds."""
+    seen: set[int] = set()
+    for root in roots:
+        waiting = [root]
         while waiting:
             element = waiting.pop()
             if id(element) in seen:
                 continue
             seen.add(id(element))
             yield element
-            waiting.extend(child for _, child in reversed(element.children))
-
-    def __str__(self) -> str:
-        name = f"{self.kind} '{self.plugin}'"
-        if self.id:
-            name += f" with id '{self.id}'"
-        return f"{name} at {self.where}" if self.where else name
+            for _, child in reversed(element.children):
+                if id(child) not in seen:
+                    waiting.append(child)
 
 
 KINDS = {
@@ -91,7 +95,7 @@ class Places:
     many.
     """
 
-    def __init__(self, files: list[Path]) -> None:
+    def __init__(self, files: list[str]) -> None:
         self._files = files
         self._line_ends: dict[int, list[int]] = {}
 
@@ -100,7 +104,7 @@ class Places:
         if file >= len(self._files):
             return ""
         if file not in self._line_ends:
-            content = np.frombuffer(self._files[file].read_bytes(), np.uint8)
+            content = np.frombuffer(Path(self._files[file]).read_bytes(), np.uint8)
             self._line_ends[file] = np.flatnonzero(content == ord("\n")).tolist()
         ends = self._line_ends[file]
         line = bisect.bisect_left(ends, offset)
@@ -112,7 +116,7 @@ def from_state(state: Any) -> list[Element]:
     """The element of each node of a parsed scene; the first is the scene itself. Objects
     that are the same in all variants, images, count as properties."""
     elements = []
-    places = Places([Path(str(file)) for file in state.files])
+    places = Places([str(file) for file in state.files])
     # Scenes have a hundred thousand nodes: names of enumerations are looked up once.
     kinds = {t: KINDS.get(t.name, t.name.lower()) for t in mi.ObjectType}
     reference: Any = mi.Properties.ResolvedReference
@@ -151,6 +155,8 @@ def from_object(instance: Any, fallback_id: str = "") -> Element:
         nested["exterior"] = instance.exterior_medium()
         if element.plugin == "instance":
             element.properties["loaded"] = True
+        if element.plugin in ("sphere", "cylinder"):
+            element.properties["to_world"] = objects.members(instance)["to_world"]
         if element.plugin == "rectangle":
             element.properties["flip_normals"] = bool(instance.has_flipped_normals())
     elif kind == "sensor":

@@ -10,12 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from . import mitsuba_objects as objects
+from .elements import Element
 from .errors import SceneError, UnsupportedFeature
 from .materials import BLACK
 from .object_arrays import ANALYTIC_TYPES, ObjectArrays
-from .scene_arrays import Emitter, SceneArrays, Vec3, no_environment
+from .scene_arrays import Emitter, SceneArrays, Vec2, Vec3, no_environment
 from .shape_arrays import NONE, Shape
+from .textures import LUMINANCE
 
+WHITE: Vec3 = (1.0, 1.0, 1.0)
+UNDECIDED = 1e-3
+"""Differences of densities below that make none in images; chosen."""
 SMALLEST_EXTENT = float(np.sqrt(np.finfo(np.float32).tiny))
 LARGEST_EXTENT = float(np.sqrt(np.finfo(np.float32).max / 3))
 """Squares of distances along a diagonal between these are normal numbers."""
@@ -29,11 +34,13 @@ def read_emitter(
     shape: int,
     corners: npt.NDArray[np.float32] | None,
     texture: int = NONE,
+    element: Element | None = None,
 ) -> Emitter:
     """Reads one emitter.
 
-    shape: number of the shape that glows, for an area light. texture: number of what it
-    shows in place of one colour, for a `rectangle`.
+    shape: number of the shape that glows, for an area light. texture: number of what it, or
+    a projector, shows in place of one colour. element: what the scene says of it, None for
+    one that was loaded.
     corners: (4, 3) vertices of that shape if it is a `rectangle`, which has its own way of
     sampling; in Mitsuba's order (0, 0), (1, 0), (0, 1), (1, 1) of (u, v).
     """
@@ -45,7 +52,13 @@ def read_emitter(
     if plugin == "area":
         radiance = BLACK if texture != NONE else objects.color(parts["radiance"], name)
         if corners is None:
-            return Emitter("area", radiance, shape=shape, sampling_weight=weight)
+            return Emitter(
+                "area",
+                radiance,
+                shape=shape,
+                radiance_texture=texture,
+                sampling_weight=weight,
+            )
         corner, along_u, along_v = corners[0], corners[1], corners[2]
         return Emitter(
             "area",
@@ -70,16 +83,30 @@ def read_emitter(
             "constant", objects.color(parts["radiance"], name), sampling_weight=weight
         )
     to_world = objects.matrix(emitter.world_transform())
-    if plugin == "envmap":
+    if plugin in ("envmap", "projector"):
         scale = objects.number(parts["scale"])
         if not (scale >= 0 and math.isfinite(scale)):
             raise SceneError(f"{name} has scale = {scale:g}: it must be at least 0")
         objects.check_invertible(to_world, name)
         first, second, third = (objects.vec3(column) for column in to_world[:3, :3].T)
+        if plugin == "projector":
+            colour = WHITE if texture != NONE else objects.color(parts["irradiance"], name)
+            return Emitter(
+                "projector",
+                objects.vec3(scale * np.array(colour)),
+                position=finite(objects.vec3(to_world[:3, 3]), name, "position"),
+                radiance_texture=texture,
+                axes=(first, second, third),
+                half_size=half_size_of(emitter, to_world),
+                sampling_weight=weight,
+            )
         return Emitter(
             "envmap",
             (scale, scale, scale),
             axes=(first, second, third),
+            mis_compensation=is_compensated(emitter, to_world)
+            if element is None
+            else bool(element.properties.get("mis_compensation", False)),
             sampling_weight=weight,
         )
     axis = unit_axis(to_world, name)
@@ -107,9 +134,72 @@ def read_emitter(
             sampling_weight=weight,
         )
     raise UnsupportedFeature(
-        f"{name} is not supported: only point, spot, directional, area, constant and "
-        "envmap are so far"
+        f"{name} is not supported: only point, spot, projector, directional, area, "
+        "constant and envmap are so far"
     )
+
+
+def half_size_of(projector: Any, to_world: npt.NDArray[np.float64]) -> Vec2:
+    """Half the width and height that a projector's picture has at the distance 1.
+
+    Mitsuba 3.9 keeps the field of view to itself, but tells where in the picture a point
+    lies; there, as in a camera, x points left.
+    """
+    module = objects.variant_module(projector)
+    place = module.SurfaceInteraction3f()
+    place.p = module.Point3f(*(to_world @ [-0.25, -0.25, 1, 1])[:3].tolist())
+    sample, _ = projector.sample_direction(place, module.Point2f(0.5, 0.5))
+    u, v = np.asarray(sample.uv, np.float64).reshape(-1)
+    return 0.125 / (float(u) - 0.5), 0.125 / (float(v) - 0.5)
+
+
+def is_compensated(envmap: Any, to_world: npt.NDArray[np.float64]) -> bool:
+    """Whether a loaded `envmap` has `mis_compensation`, which Mitsuba 3.9 keeps to itself.
+
+    Its light samples are then as dense as the picture is brighter than its mean. That is
+    decided by the pixel that is chosen most differently beside the brightest one.
+    """
+    picture = read_environment(envmap, "envmap")
+    light = picture.astype(np.float64) @ LUMINANCE
+    mean, inner = light.mean(), light[1:-1]
+    brightest = inner.max()
+    if not brightest > mean:
+        return False
+    plain = inner / brightest
+    compensated = np.maximum(inner - mean, 0) / (brightest - mean)
+    differences = np.abs(plain - compensated)
+    if differences.max() < UNDECIDED:
+        return False
+    places = [np.unravel_index(int(np.argmax(a)), a.shape) for a in (differences, inner)]
+    module = objects.variant_module(envmap)
+
+    def density(row: int, column: int) -> float:
+        height, width = light.shape
+        theta, phi = math.pi * row / (height - 1), 2 * math.pi * (column + 0.5) / width
+        local = (
+            math.sin(phi) * math.sin(theta),
+            math.cos(theta),
+            -math.cos(phi) * math.sin(theta),
+        )
+        way = to_world[:3, :3] @ local
+        sample = module.DirectionSample3f()
+        sample.d = module.Vector3f(*(way / np.linalg.norm(way)).tolist())
+        place = module.SurfaceInteraction3f()
+        return objects.number(envmap.pdf_direction(place, sample))
+
+    answers = [density(int(row) + 1, int(column)) for row, column in places]
+    ratio = answers[0] / answers[1]
+    return bool(abs(ratio - compensated[places[0]]) < abs(ratio - plain[places[0]]))
+
+
+def light_warnings(lights: Iterable[Emitter], bsdf_samples: int) -> list[str]:
+    """What of the light is missing, as it is in Mitsuba."""
+    if bsdf_samples == 0 and any(light.mis_compensation for light in lights):
+        return [
+            "the envmap has mis_compensation, which leaves what is darker than its mean to "
+            "BSDF samples, and there are none: their light is missing, as in Mitsuba"
+        ]
+    return []
 
 
 def environment_of(

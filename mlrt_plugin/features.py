@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import mitsuba_objects as objects
-from .elements import Element
+from .elements import Element, walk_once
 from .errors import UnsupportedFeature
 from .materials import DELTA
 from .object_arrays import ANALYTIC_TYPES
@@ -18,7 +18,7 @@ from .textures import VARYING
 MESHES = ("obj", "ply", "serialized", "rectangle", "cube", "mesh")
 SHAPES = (*MESHES, *ANALYTIC_TYPES, "shapegroup", "instance")
 BSDFS = ("diffuse", "twosided", "mask", *DELTA)
-EMITTERS = ("point", "spot", "directional", "area", "constant", "envmap")
+EMITTERS = ("point", "spot", "projector", "directional", "area", "constant", "envmap")
 SENSORS = ("perspective", "thinlens", "orthographic")
 FILMS = ("hdrfilm",)
 FILTERS = ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos")
@@ -26,8 +26,10 @@ SAMPLERS = ("independent", "stratified", "multijitter", "orthogonal", "ldsampler
 CONSTANT_TEXTURES = ("uniform", "srgb", "d65")
 TEXTURES = (*CONSTANT_TEXTURES, *VARYING)
 LIGHT_TEXTURES = ("bitmap", "checkerboard")
-"""Of those that vary, what an area light can show."""
+"""Of those that vary, what an area light and a projector can show."""
 
+NOT_TURNED = 1e-6
+"""What an axis may have of another, relatively; chosen."""
 NOT_RGB = "RGB variants do not have it: write the colour as <rgb> or <spectrum value>"
 REFUSED = {
     ("texture", "regular"): NOT_RGB,
@@ -55,14 +57,10 @@ NATIVE = {
 def used_elements(scene: Element, sensor: int) -> Iterator[Element]:
     """The elements that the image depends on: shapes, emitters, the chosen sensor, and what
     these hold. What is declared but never referred to is left out."""
-    seen: set[int] = set()
-    for kind in ("sensor", "shape", "emitter"):
-        for number, child in enumerate(scene.children_of(kind)):
-            if kind == "sensor" and number != sensor:
-                continue
-            if kind == "emitter" and child.plugin == "area":
-                continue  # it counts where a shape refers to it
-            yield from child.walk_new(seen)
+    sensors = [e for n, e in enumerate(scene.children_of("sensor")) if n == sensor]
+    # An area light counts where a shape refers to it.
+    lights = [e for e in scene.children_of("emitter") if e.plugin != "area"]
+    return walk_once([*sensors, *scene.children_of("shape"), *lights])
 
 
 def reason_against(element: Element) -> str:
@@ -74,6 +72,10 @@ def reason_against(element: Element) -> str:
         return (
             f"only {', '.join(n for n in NATIVE[kind] if n != 'mesh')} are supported so far"
         )
+    if plugin == "instance":
+        if element.properties.get("loaded"):
+            return "what a loaded instance refers to cannot be told: give the file"
+        return ""
     if plugin == "spot" and any(
         name == "texture" and child.plugin != "uniform" for name, child in element.children
     ):
@@ -88,22 +90,21 @@ def reason_against(element: Element) -> str:
     if kind == "shape" and any(element.children_of("texture")):
         return "textures that are attributes of a shape are not supported yet"
     if kind == "shape" and has_textured_light(element):
-        if plugin != "rectangle":
-            return "lights with a texture are supported on rectangles only so far"
-        if element.properties.get("flip_normals", False):
+        if plugin not in ("rectangle", *ANALYTIC_TYPES):
+            return (
+                "lights with a texture are supported on rectangles, "
+                f"{', '.join(ANALYTIC_TYPES)} only so far"
+            )
+        if plugin != "disk" and plugin in ANALYTIC_TYPES and is_turned(element):
+            return "its light has a texture and is turned"
+        if plugin == "rectangle" and element.properties.get("flip_normals", False):
             return "its light has a texture and is turned by flip_normals"
     if plugin in (*ANALYTIC_TYPES, "shapegroup") and has_attributes(element):
         return "textures of the type mesh_attribute are not supported on it yet"
-    if plugin == "instance" and element.properties.get("loaded"):
-        return "what a loaded instance refers to cannot be told: give the file"
     if plugin == "orthogonal" and element.properties.get("strength", 2) != 2:
         return "only arrays of strength 2 are supported so far"
     if plugin == "orthographic" and shears(element.properties.get("to_world")):
         return "its to_world shears, which is not supported yet"
-    if plugin == "envmap" and element.properties.get("mis_compensation", False):
-        return "mis_compensation is not supported yet"
-    if plugin == "mitchell" and {"B", "C"} & element.properties.keys():
-        return "only its usual parameters B and C are supported so far"
     if plugin == "twosided" and any(
         child.plugin not in ("diffuse", "conductor")
         for child in element.children_of("bsdf")
@@ -121,6 +122,30 @@ def has_textured_light(shape: Element) -> bool:
         for emitter in shape.children_of("emitter")
         for texture in emitter.children_of("texture")
     )
+
+
+def is_turned(shape: Element) -> bool:
+    """Whether the axes of a sphere or cylinder, of which the z axis leads along the
+    latter, are not those of the world, up to scales.
+
+    Mitsuba 3.9 looks for a point of a texture on such a shape along a line that it does not
+    turn with it, and may find another point.
+    """
+    axes = np.eye(3)
+    to_world = shape.properties.get("to_world")
+    if to_world is not None:
+        axes = objects.matrix(to_world)[:3, :3]
+    if shape.plugin == "cylinder":
+        ends = (
+            shape.properties.get("p0", (0, 0, 0)),
+            shape.properties.get("p1", (0, 0, 1)),
+        )
+        x, y, z = (float(b) - float(a) for a, b in zip(*ends, strict=True))
+        if z <= 0 or max(abs(x), abs(y)) > NOT_TURNED * z:
+            return True
+    diagonal = np.diag(axes)
+    others = np.abs(axes - np.diag(diagonal)).max()
+    return bool(diagonal.min() <= 0 or others > NOT_TURNED * diagonal.min())
 
 
 def has_attributes(shape: Element) -> bool:
@@ -170,9 +195,19 @@ def list_features(scene: Element, sensor: int) -> tuple[Feature, ...]:
             e.id,
             e.where,
             "" if e.kind == "integrator" else reason_against(e),
-            e.kind == "bsdf" and any(part.plugin in VARYING for part in e.walk()),
+            e.kind == "bsdf" and has_varying_index(e),
         )
         for e in found
+    )
+
+
+def has_varying_index(bsdf: Element) -> bool:
+    """Whether the complex index of refraction of a BSDF is not the same everywhere."""
+    return any(
+        part.plugin in VARYING
+        for name, child in bsdf.children
+        if name in ("eta", "k")
+        for part in child.walk()
     )
 
 

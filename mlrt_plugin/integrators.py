@@ -30,10 +30,9 @@ MISSING = {
 """What an integrator computes and `direct` does not."""
 AOV_NAMES = {"depth": "depth", "sh_normal": "normal"}
 """Variables of Mitsuba's integrator `aov` that are had here, and their names."""
-POINTLIKE = ("point", "spot", "directional")
-"""Emitters whose light comes from one direction at each point."""
-UNHITTABLE = (*POINTLIKE, "projector")
-"""Emitters that no ray meets, so that BSDF samples find nothing of them."""
+POINTLIKE = ("point", "spot", "projector", "directional")
+"""Emitters whose light comes from one direction at each point, which no ray meets, so that
+BSDF samples find nothing of them."""
 MOST_SAMPLES = 256
 """Of emitters, and of BSDFs, of a camera sample, natively; chosen, as memory grows with
 them."""
@@ -103,7 +102,11 @@ def named(features: tuple[Feature, ...], lighting: Lighting) -> str:
     """The integrator with its id and place, for messages."""
     integrator = lighting.integrator
     return next(
-        (str(f) for f in features if (f.kind, f.plugin) == ("integrator", integrator)),
+        (
+            str(f)
+            for f in reversed(features)
+            if f.kind == "integrator" and f.plugin == integrator
+        ),
         f"integrator '{integrator}'",
     )
 
@@ -186,8 +189,6 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
     if lighting.integrator == "depth":
         return ""
     name = named(features, lighting)
-    if lighting.integrator == "moment" and not what_is_missing(lighting):
-        return f"{name} asks for second moments, which only the path by Mitsuba computes"
     for what in ("emitter_samples", "bsdf_samples"):
         count = getattr(lighting, what)
         if count > MOST_SAMPLES:
@@ -202,7 +203,7 @@ def native_obstacle(features: tuple[Feature, ...], lighting: Lighting) -> str:
         if specular:
             return (
                 f"lights in {specular[0]} are found by BSDF samples, which {name} asks for "
-                "and which are not taken natively of such a material with a texture"
+                "and which are not taken natively where the index of refraction varies"
             )
     return ""
 
@@ -212,7 +213,7 @@ def takes_bsdf_samples(features: tuple[Feature, ...], lighting: Lighting) -> boo
     return (
         lighting.bsdf_samples > 0
         and lighting.integrator != "depth"
-        and any(f.kind == "emitter" and f.plugin not in UNHITTABLE for f in features)
+        and any(f.kind == "emitter" and f.plugin not in POINTLIKE for f in features)
     )
 
 

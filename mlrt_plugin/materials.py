@@ -26,6 +26,15 @@ DELTA = (*SPECULAR, "null")
 mirror or let through is found by BSDF samples."""
 
 
+SPECULAR_COLOURS = {
+    "reflectance": "specular_reflectance",
+    "transmittance": "specular_transmittance",
+    "eta": "eta",
+    "k": "k",
+}
+"""Colours of mirrors and glass, and Mitsuba's names of them."""
+
+
 @dataclass(frozen=True)
 class Side:
     """What one side of a surface reflects: a colour, the number of a texture, or what it
@@ -109,8 +118,8 @@ class MaterialTable:
     def uses_coordinates(self) -> list[bool]:
         """Which rows depend on the texture coordinates of the surface."""
         return [
-            any(self.textures.uses_coordinates(int(number)) for number in row)
-            for row in self.texture_array()
+            any(map(self.textures.uses_coordinates, textures_of(material)))
+            for material in self._rows
         ]
 
     def add_light(self, surface: Surface, elements: Mapping[str, Element]) -> int:
@@ -119,17 +128,25 @@ class MaterialTable:
         emitter = surface.shape.emitter()
         if emitter is None:
             return NONE
-        radiance = objects.members(emitter)["radiance"]
-        if objects.plugin_name(radiance) not in VARYING:
+        return self.add_picture(emitter, surface, elements)
+
+    def add_picture(
+        self, emitter: Any, surface: Surface, elements: Mapping[str, Element]
+    ) -> int:
+        """The same for an emitter, which may be a projector; NONE for all others."""
+        name = {"area": "radiance", "projector": "irradiance"}.get(
+            objects.plugin_name(emitter), ""
+        )
+        shown = objects.members(emitter)[name] if name else None
+        if shown is None or objects.plugin_name(shown) not in VARYING:
             return NONE
         element = elements.get(emitter.id()) or from_object(emitter)
-        child = child_of(element, "radiance", radiance)
-        return self.textures.add_colour(radiance, child, surface)
+        return self.textures.add_colour(shown, child_of(element, name, shown), surface)
 
     def _read(self, bsdf: Any, element: Element, surface: Surface) -> Material:
         plugin = objects.plugin_name(bsdf)
         if plugin in SPECULAR and self._mirrors:
-            side = Side(specular=read_specular(bsdf, plugin, f"bsdf of {surface.name}"))
+            side = Side(specular=self._specular(bsdf, plugin, element, surface))
             behind = Side() if plugin == "conductor" else side
             return Material(side, behind, delta=True)
         if plugin in DELTA:
@@ -169,21 +186,35 @@ class MaterialTable:
         child = child_of(element, "reflectance", reflectance)
         return Side(texture=self.textures.add_colour(reflectance, child, surface))
 
+    def _specular(
+        self, bsdf: Any, plugin: str, element: Element, surface: Surface
+    ) -> Specular:
+        """What a mirror or glass does; raises what `mitsuba_objects.color` does."""
+        parts, owner = objects.members(bsdf), f"bsdf of {surface.name}"
+        fields: dict[str, Any] = {}
+        for name, key in SPECULAR_COLOURS.items():
+            value = parts.get(key)
+            if not isinstance(value, mi.Object):
+                continue
+            if name not in ("eta", "k") and objects.plugin_name(value) in VARYING:
+                fields[f"{name}_texture"] = self.textures.add_colour(
+                    value, child_of(element, key, value), surface
+                )
+            else:
+                fields[name] = objects.color(value, owner)
+        ior = 1.0 if plugin == "conductor" else objects.number(parts["eta"])
+        if not (ior > 0 and math.isfinite(ior)):
+            raise SceneError(
+                f"{owner} has an index of refraction of {ior}: make it positive"
+            )
+        return Specular(plugin, **fields, ior=ior)
 
-def read_specular(bsdf: Any, plugin: str, owner: str) -> Specular:
-    """What a mirror or glass does; raises what `mitsuba_objects.color` does."""
-    parts = objects.members(bsdf)
-    colours = {
-        name: objects.color(parts[key], owner)
-        for name, key in {
-            "reflectance": "specular_reflectance",
-            "transmittance": "specular_transmittance",
-            "eta": "eta",
-            "k": "k",
-        }.items()
-        if isinstance(parts.get(key), mi.Object)
-    }
-    ior = 1.0 if plugin == "conductor" else objects.number(parts["eta"])
-    if not (ior > 0 and math.isfinite(ior)):
-        raise SceneError(f"{owner} has an index of refraction of {ior}: make it positive")
-    return Specular(plugin, **colours, ior=ior)
+
+def textures_of(material: Material) -> list[int]:
+    """The numbers of all that a material shows."""
+    numbers = [material.front.texture, material.back.texture, material.opacity]
+    for side in (material.front, material.back):
+        if side.specular is not None:
+            numbers.append(side.specular.reflectance_texture)
+            numbers.append(side.specular.transmittance_texture)
+    return numbers

@@ -35,6 +35,7 @@ PLUGIN_OF_CLASS = {
     "Null": "null",
     "PointLight": "point",
     "SpotLight": "spot",
+    "Projector": "projector",
     "DirectionalEmitter": "directional",
     "AreaLight": "area",
     "ConstantBackgroundEmitter": "constant",

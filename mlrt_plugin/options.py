@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Sequence
 from typing import Any
+
+from .errors import SceneError
 
 TRACE_OPTIONS = (
     "traversal",
@@ -48,7 +51,7 @@ SHADOW_OFFSETS = ("mitsuba", "robust")
 """Values of the option ``shadow_offset``: ``cpp/render/shadow_offset.h``."""
 
 AOVS = ("depth", "normal", "prim", "cost", "moment")
-"""Images that can be had beside the colours: `cost` natively, `moment` by Mitsuba only."""
+"""Images that can be had beside the colours: `cost` natively only."""
 
 
 def integer(value: object, name: str) -> int:
@@ -57,6 +60,20 @@ def integer(value: object, name: str) -> int:
         return operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         raise TypeError(f"{name} must be a whole number, not {value!r}") from None
+
+
+def checked_resolution(resolution: Sequence[object]) -> tuple[int, int]:
+    """A (width, height) in pixels; raises ValueError or TypeError for what is none, and
+    SceneError for one that is too small."""
+    if isinstance(resolution, str) or len(resolution) != 2:
+        raise ValueError(f"resolution must be (width, height), not {resolution!r}")
+    width, height = resolution
+    checked = integer(width, "width"), integer(height, "height")
+    if min(checked) < 1:
+        raise SceneError(
+            f"resolution {checked[0]}x{checked[1]} is too small: both must be at least 1"
+        )
+    return checked
 
 
 def split_options(params: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,25 +61,12 @@ counts."""
 T = TypeVar("T")
 
 
-class Once:
-    """Lets something be done a single time."""
-
-    def __init__(self) -> None:
-        self._done = False
-
-    def do(self, refusal: str) -> None:
-        """Raises RuntimeError with that message from the second time on."""
-        if self._done:
-            raise RuntimeError(refusal)
-        self._done = True
-
-
 @dataclass
 class ParsedScene:
     """A parsed scene, not yet loaded; ``elements[i]`` describes ``state.nodes[i]``.
 
     resolver: where its files are looked for, those of its <path> elements included.
-    loading: changes the state, in whichever variant, and can be done once.
+    was_loaded: loading changes the state, which can be done once.
     """
 
     config: Any
@@ -87,15 +74,15 @@ class ParsedScene:
     elements: list[Element]
     resolver: Any
     name: str
-    loading: Once = field(default_factory=Once)
+    was_loaded: bool = False
 
     @property
     def root(self) -> Element:
         return self.elements[0]
 
-    def of_variant(self, variant: str) -> ParsedScene:
-        """The same, to be loaded in another variant; not if it holds loaded objects."""
-        return replace(self, config=parser_config(variant))
+    def set_variant(self, variant: str) -> None:
+        """Lets it be loaded in another variant; not if it holds loaded objects."""
+        self.config = parser_config(variant)
 
 
 def failing_element(message: str, elements: Sequence[Element]) -> Element | None:
@@ -320,15 +307,20 @@ def numbered(parsed: ParsedScene) -> dict[str, Element]:
 
     Raises RuntimeError if that has been done before.
     """
-    parsed.loading.do(f"scene '{parsed.name}' was loaded from this before: parse it anew")
+    if parsed.was_loaded:
+        raise RuntimeError(
+            f"scene '{parsed.name}' was loaded from this before: parse it anew"
+        )
+    parsed.was_loaded = True
     by_id = {}
     for number, (node, element) in enumerate(
         zip(parsed.state.nodes, parsed.elements, strict=True)
     ):
         if element.kind == "integrator":
             node.props = mi.Properties("direct")
-        node.props.set_id(f"n{number}")
-        by_id[f"n{number}"] = element
+        name = f"n{number}"
+        node.props.set_id(name)
+        by_id[name] = element
     return by_id
 
 

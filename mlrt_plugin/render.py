@@ -139,11 +139,6 @@ class PreparedScene(RayQueries):
         if build:
             raise TypeError(f"option '{next(iter(build))}' is of prepare, not of render")
         check_aovs(aovs)
-        if "moment" in aovs:
-            raise MlrtError(
-                "aov 'moment' does not exist where shading is native: leave it out, or "
-                "choose shading = mitsuba"
-            )
         name = next((str(f) for f in self.arrays.features if f.kind == "sampler"), "")
         asked = own_spp(self.arrays.spp, name) if spp is None else checked_spp(spp)
         sampler, film = self.arrays.sampler, self.arrays.film
@@ -304,8 +299,8 @@ def render(
     seed: chooses the random numbers, as in ``mi.render``.
     sensor: number of the sensor, in the order of declaration; of a loaded scene also a
     sensor. threads: None takes all of Dr.Jit's pool.
-    aovs: further images, of depth, normal, prim, cost (natively only) and moment (by
-    Mitsuba only; (H, W, 6) with mean and second moment in XYZ).
+    aovs: further images, of depth, normal, prim, cost (natively only) and moment
+    ((H, W, 6) with mean and second moment in XYZ).
     shadow_offset: how shadow rays are kept off surfaces: "mitsuba", by Mitsuba's formula;
     "robust", by a bound of the error, for scenes of any size. None takes what the scene
     gives its integrator `mlrt`, else "mitsuba".

@@ -49,8 +49,8 @@ def same_geometry(one: HasGeometry, other: HasGeometry) -> bool:
 
 @dataclass(frozen=True)
 class Emitter:
-    """A light source; ``type`` is one of point, spot, directional, area, constant and
-    envmap, of which a scene has at most one of the last two."""
+    """A light source; ``type`` is one of point, spot, projector, directional, area,
+    constant and envmap, of which a scene has at most one of the last two."""
 
     type: str
     radiance: Vec3
@@ -65,6 +65,8 @@ class Emitter:
     edge_u: Vec3 = (0.0, 0.0, 0.0)
     edge_v: Vec3 = (0.0, 0.0, 0.0)
     axes: tuple[Vec3, Vec3, Vec3] = UNIT_AXES
+    half_size: Vec2 = (1.0, 1.0)
+    mis_compensation: bool = False
     sampling_weight: float = 1.0
 
 
@@ -112,6 +114,8 @@ class Film:
     filter: str = "gaussian"
     filter_radius: float = 2.0
     filter_stddev: float = 0.5
+    filter_b: float = 1 / 3
+    filter_c: float = 1 / 3
     sample_border: bool = False
 
 
@@ -120,7 +124,7 @@ class Feature:
     """An element of the scene: a plugin of some kind, and whether it is rendered natively.
 
     ``reason`` is empty if it is, and otherwise says what is not supported. ``varies``: of a
-    BSDF, whether it holds a texture that is not the same everywhere.
+    BSDF, whether its index of refraction is not the same everywhere.
     """
 
     kind: str

@@ -29,7 +29,7 @@ from .image_headers import check_image_file
 from .loaded_scene import LoadedScene
 from .materials import MaterialTable
 from .mesh_files import check_mesh_file
-from .options import integer
+from .options import checked_resolution, integer
 from .scene_arrays import Feature, Lighting, SceneArrays
 from .shape_arrays import NONE, Shape
 from .texture_coordinates import gather_coordinates
@@ -90,15 +90,7 @@ def import_scene(
     if not isinstance(sensor, mi.Object):
         sensor = integer(sensor, "sensor")
     if resolution is not None:
-        if isinstance(resolution, str) or len(resolution) != 2:
-            raise ValueError(f"resolution must be (width, height), not {resolution!r}")
-        width, height = resolution
-        resolution = integer(width, "width"), integer(height, "height")
-    if resolution is not None and min(resolution) < 1:
-        raise SceneError(
-            f"resolution {resolution[0]}x{resolution[1]} is too small: both must be at "
-            "least 1"
-        )
+        resolution = checked_resolution(resolution)
     if is_loaded_scene(scene):
         if defines:
             raise SceneError(
@@ -127,8 +119,10 @@ def import_scene(
         raise UnsupportedFeature(obstacle)
     warnings = integrators.integrator_warnings(found, lighting)
     if parsed is not None:
-        check_transforms(parsed)
-        check_files(parsed)
+        used = list(features.used_elements(parsed.root, -1))
+        # Where instances stand is read, and checked, later.
+        check_transforms([e for e in used if e.plugin != "instance"])
+        check_files(parsed, used)
         if resolution is not None:
             set_resolution(parsed, sensor, resolution)
         parts, names = parsing.instantiate(parsed, scene_objects.plain_instances(parsed))
@@ -237,25 +231,21 @@ def check_contents(root: Element, sensor: int, name: str) -> None:
                 raise SceneError(f"{film} has {name} = {size}: it must be at least 1")
 
 
-def check_transforms(parsed: parsing.ParsedScene, sensor: int = -1) -> None:
-    """Raises SceneError for a to_world that is not finite or flattens what it moves, of
-    the shapes, the emitters and a sensor."""
-    moved = [
-        element
-        for element in features.used_elements(parsed.root, sensor)
-        if element.properties.get("to_world") is not None
-    ]
+def check_transforms(used: list[Element]) -> None:
+    """Raises SceneError for a to_world, of some elements, that is not finite or flattens
+    what it moves."""
+    moved = [e for e in used if e.properties.get("to_world") is not None]
     if moved:
         matrices = (e.properties["to_world"].matrix for e in moved)
         objects.check_all_invertible(objects.scalar_matrices(matrices, len(moved)), moved)
 
 
-def check_files(parsed: parsing.ParsedScene) -> None:
+def check_files(parsed: parsing.ParsedScene, used: list[Element]) -> None:
     """Raises SceneError for images without pixels, and for mesh files whose indices would
-    make Mitsuba crash."""
+    make Mitsuba crash, of the elements that are used."""
     checked = set()
     with parsing.resolving_by(parsed.resolver):
-        for element in features.used_elements(parsed.root, -1):
+        for element in used:
             for name in ("bitmap", "data"):
                 if name in element.properties and 0 in np.shape(element.properties[name]):
                     raise SceneError(f"{element} has a {name} of no pixels: give it some")
@@ -350,6 +340,22 @@ def collect(
     )
     camera = cameras.read_camera(sensor, name_of(sensor))
     ignored += cameras.camera_warnings(camera, name_of(sensor))
+    read = tuple(
+        emitters.read_emitter(
+            source,
+            name_of(source),
+            shape,
+            meshes.rectangle_corners(geometry, shapes, shape),
+            lights[shape]
+            if shape < len(lights)
+            else materials.add_picture(
+                source, Surface(source, name_of(source), 0, 0), names
+            ),
+            names.get(source.id()),
+        )
+        for source, shape in zip(sources, shape_of_emitter, strict=True)
+    )
+    ignored += emitters.light_warnings(read, lighting.bsdf_samples)
     return SceneArrays(
         vertices=geometry.vertices,
         faces=geometry.faces,
@@ -367,16 +373,7 @@ def collect(
             for number in range(len(shapes))
         ),
         materials=materials.array(),
-        emitters=tuple(
-            emitters.read_emitter(
-                source,
-                name_of(source),
-                shape,
-                meshes.rectangle_corners(geometry, shapes, shape),
-                lights[shape] if shape < len(lights) else NONE,
-            )
-            for source, shape in zip(sources, shape_of_emitter, strict=True)
-        ),
+        emitters=read,
         camera=camera,
         film=film,
         lighting=lighting,

@@ -233,7 +233,8 @@ def placements(
     """(I, 3, 4) maps of points to the world and (I, 3, 3) maps of normals.
 
     Mitsuba keeps both, and they do not belong together where a scene rotates about an axis
-    that is not of unit length; its image is that of what it keeps.
+    that is not of unit length; its image is that of what it keeps. Raises SceneError for a
+    map that is not finite or flattens the instance.
     """
     maps = np.tile(np.eye(3, 4), (len(instances), 1, 1))
     normals = np.tile(np.eye(3), (len(instances), 1, 1))
@@ -244,7 +245,9 @@ def placements(
     }
     rows, count = list(moves), len(moves)
     matrices = (to_world.matrix for to_world in moves.values())
-    maps[rows] = objects.scalar_matrices(matrices, count)[:, :3]
+    to_worlds = objects.scalar_matrices(matrices, count)
+    objects.check_all_invertible(to_worlds, [instances[row] for row in rows])
+    maps[rows] = to_worlds[:, :3]
     matrices = (to_world.inverse_transpose for to_world in moves.values())
     normals[rows] = objects.scalar_matrices(matrices, count)[:, :3, :3]
     return maps, normals

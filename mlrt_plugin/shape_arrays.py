@@ -29,6 +29,8 @@ class Specular:
     type: str
     reflectance: tuple[float, float, float] = (1.0, 1.0, 1.0)
     transmittance: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    reflectance_texture: int = NONE
+    transmittance_texture: int = NONE
     eta: tuple[float, float, float] = (0.0, 0.0, 0.0)
     k: tuple[float, float, float] = (0.0, 0.0, 0.0)
     ior: float = 1.0

@@ -13,6 +13,7 @@ from plugin_scenes import (
     scene,
     sensor,
     text,
+    texture,
 )
 
 SKY = '<emitter type="constant"><rgb name="radiance" value="0.3, 0.4, 0.6"/></emitter>'
@@ -46,6 +47,30 @@ MASKED = tuple(
     bsdf("mask", number("opacity", 0.4) + inner)
     for inner in (bsdf("conductor"), bsdf("dielectric"), bsdf("thindielectric"))
 )
+BOARD = (
+    colour("color0", "0.9, 0.5, 0.2")
+    + number("color1", 0.1)
+    + '<transform name="to_uv"><scale x="3" y="2"/></transform>'
+)
+TEXTURED = (
+    bsdf("conductor", texture("specular_reflectance", "checkerboard", BOARD)),
+    bsdf(
+        "twosided",
+        bsdf("conductor", texture("specular_reflectance", "checkerboard", BOARD))
+        + bsdf("diffuse"),
+    ),
+    bsdf(
+        "dielectric",
+        texture("specular_reflectance", "checkerboard", BOARD)
+        + texture("specular_transmittance", "checkerboard", BOARD),
+    ),
+    bsdf("thindielectric", texture("specular_transmittance", "checkerboard", BOARD)),
+    bsdf(
+        "mask",
+        texture("opacity", "checkerboard", BOARD)
+        + bsdf("conductor", texture("specular_reflectance", "checkerboard", BOARD)),
+    ),
+)
 INSIDE = (
     '<shape type="{}"><transform name="to_world"><scale value="{}"/>'
     '<translate x="0.3" y="1.2" z="6"/></transform>{}</shape>'
@@ -62,6 +87,15 @@ SCENES = {
     "metals": scene(row_of_materials(*METALS), LAMP + PANEL + WALLS),
     "glass": scene(row_of_materials(*GLASS), PANEL + WALLS),
     "masks": scene(row_of_materials(*MASKED), PANEL + WALLS),
+    "textures": scene(row_of_materials(*TEXTURED), PANEL + WALLS),
+    "textures under the sky": scene(
+        row_of_materials(*TEXTURED[:3])
+        + f'<shape type="shapegroup" id="group">{block(TEXTURED[0], 0, "disk")}'
+        f"{block(TEXTURED[2])}</shape>"
+        '<shape type="instance"><ref id="group"/><transform name="to_world">'
+        '<translate x="1.8"/></transform></shape>',
+        LAMP + SKY,
+    ),
     "metals under the sky": scene(row_of_materials(*METALS), LAMP + SKY),
     "glass under the sky": scene(row_of_materials(*GLASS), SKY + WALLS),
     "light in glass": scene(GLOWING_CORE, PANEL),

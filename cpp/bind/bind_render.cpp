@@ -31,7 +31,8 @@ emitter_samples, bsdf_samples: of each camera sample, weighed by the power heuri
 are taken; light from one direction counts for each emitter sample, as in Mitsuba's `direct`.
 shadow_offset: where shadow rays begin and end, 'mitsuba' or 'robust' (render/shadow_offset.h).
 aovs: names among 'depth' (float32 (H, W), distance from the near plane, 0 for a miss) and
-'normal' (float32 (H, W, 3), shading normal), which are filtered as the colours are, and
+'normal' (float32 (H, W, 3), shading normal) and 'moment' (float32 (H, W, 6), the samples in
+CIE XYZ and their squares), which are filtered as the colours are, and
 'prim' (int32 (H, W), face that each pixel's first sample hit, -1 for a miss); 'cost' (float32
 (H, W), nodes visited and triangles tested for all rays of a sample, the mean of the pixel's
 samples, where rays that are traced together share alike) tells of the options.
@@ -49,13 +50,15 @@ AovSet aovs_from(const std::vector<std::string> &names) {
             aovs.depth = true;
         else if (name == "normal")
             aovs.normal = true;
+        else if (name == "moment")
+            aovs.moment = true;
         else if (name == "prim")
             aovs.primitive = true;
         else if (name == "cost")
             aovs.cost = true;
         else
-            refuse_value("aovs must be among: depth, normal, prim, cost; not '" + name +
-                         "'.");
+            refuse_value("aovs must be among: depth, normal, moment, prim, cost; not '" +
+                         name + "'.");
     }
     return aovs;
 }
@@ -118,6 +121,8 @@ nb::dict render_scene(const SceneHandle &handle, uint32_t spp, uint32_t seed,
         pictures["depth"] = to_numpy(result.depth.release(), {height, width});
     if (settings.aovs.normal)
         pictures["normal"] = to_numpy(result.normal.release(), {height, width, 3});
+    if (settings.aovs.moment)
+        pictures["moment"] = to_numpy(result.moment.release(), {height, width, 6});
     if (settings.aovs.primitive)
         pictures["prim"] = to_numpy(result.primitive.release(), {height, width});
     if (settings.aovs.cost)

@@ -6,7 +6,6 @@
 #include "bind/scene_handle.h"
 #include "bind/textures.h"
 #include "bind/tree_handle.h"
-#include "render/filter.h"
 
 #include <cmath>
 #include <cstring>
@@ -69,7 +68,7 @@ void add_textures(std::vector<Material> &materials,
     }
 }
 
-Specular specular_from(nb::handle dict, const std::string &name) {
+Specular specular_from(nb::handle dict, const std::string &name, size_t texture_count) {
     Fields fields(dict, name);
     Specular specular;
     specular.type = fields.choice<SpecularType>(
@@ -78,6 +77,9 @@ Specular specular_from(nb::handle dict, const std::string &name) {
                  {"thindielectric", SpecularType::thindielectric}});
     specular.reflectance = fields.vector("reflectance", specular.reflectance);
     specular.transmittance = fields.vector("transmittance", specular.transmittance);
+    specular.reflectance_texture = fields.index("reflectance_texture", texture_count, NONE);
+    specular.transmittance_texture =
+        fields.index("transmittance_texture", texture_count, NONE);
     specular.eta = fields.vector("eta", specular.eta);
     specular.k = fields.vector("k", specular.k);
     specular.ior = fields.number("ior", specular.ior);
@@ -92,7 +94,8 @@ using SpecularSides = std::vector<std::tuple<uint32_t, uint32_t, bool>>;
 void add_speculars(SceneData &scene, const nb::list &speculars,
                    const SpecularSides &sides) {
     for (size_t i = 0; i < speculars.size(); ++i)
-        scene.speculars.push_back(specular_from(speculars[i], numbered("speculars", i)));
+        scene.speculars.push_back(
+            specular_from(speculars[i], numbered("speculars", i), scene.textures.size()));
     if (!sides.empty() && sides.size() != scene.materials.size())
         refuse_value(
             "material_speculars must be empty or have as many entries as materials.");
@@ -158,18 +161,18 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.type =
         fields.choice<EmitterType>("type", {{"point", EmitterType::point},
                                             {"spot", EmitterType::spot},
+                                            {"projector", EmitterType::projector},
                                             {"directional", EmitterType::directional},
                                             {"area", EmitterType::area},
                                             {"constant", EmitterType::constant},
                                             {"envmap", EmitterType::envmap}});
-    const bool point = emitter.type == EmitterType::point;
     const bool spot = emitter.type == EmitterType::spot;
     const bool directional = emitter.type == EmitterType::directional;
     const bool area = emitter.type == EmitterType::area;
 
     emitter.radiance = fields.vector("radiance");
-    emitter.position =
-        point || spot ? fields.vector("position") : fields.vector("position", {});
+    emitter.position = is_at_point(emitter.type) ? fields.vector("position")
+                                                 : fields.vector("position", {});
     emitter.direction = spot || directional ? unit_vector(fields, "direction")
                                             : fields.vector("direction", {});
     emitter.cutoff_angle =
@@ -185,6 +188,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
     emitter.edge_v = rectangle ? fields.vector("edge_v") : fields.vector("edge_v", {});
     if (fields.has("axes"))
         emitter.axes = fields.vectors("axes");
+    emitter.half_size = fields.vector2("half_size", {1, 1});
+    emitter.mis_compensation = fields.boolean("mis_compensation", false);
     emitter.sampling_weight = fields.number("sampling_weight", 1);
     fields.finish();
 
@@ -192,8 +197,8 @@ Emitter emitter_from(nb::handle dict, const std::string &name, size_t shape_coun
         refuse_value(fields.path("sampling_weight") + " must not be negative.");
     if (spot && !(emitter.beam_width <= emitter.cutoff_angle && emitter.beam_width >= 0))
         refuse_value(fields.path("beam_width") + " must be from 0 to the cut-off angle.");
-    if (emitter.radiance_texture != NONE && !rectangle)
-        refuse_value(fields.path("radiance_texture") + " is for rectangles that glow.");
+    if (!(emitter.half_size.x > 0 && emitter.half_size.y > 0))
+        refuse_value(fields.path("half_size") + " must be positive.");
     if (area && emitter.shape == NONE)
         refuse_value(fields.path("shape") + " must name the shape that glows.");
     const double volume =
@@ -273,90 +278,6 @@ SceneHandle make_scene(const TreeHandle &tree, const Array<uint32_t> &faces,
 }
 
 } // namespace
-
-Camera camera_from(nb::handle dict) {
-    Fields fields(dict, "camera");
-    Camera camera;
-    camera.origin = fields.vector("origin");
-    camera.axes = fields.vectors("axes");
-    camera.type = fields.choice<CameraType>("type",
-                                            {{"perspective", CameraType::perspective},
-                                             {"thinlens", CameraType::thinlens},
-                                             {"orthographic", CameraType::orthographic}},
-                                            CameraType::perspective);
-    const bool lens = camera.type == CameraType::thinlens;
-    camera.tan_half_fov_x = camera.type == CameraType::orthographic
-                                ? fields.number("tan_half_fov_x", 1)
-                                : fields.number("tan_half_fov_x");
-    camera.half_extent = fields.vector2("half_extent", {1, 1});
-    camera.aperture_radius =
-        lens ? fields.number("aperture_radius") : fields.number("aperture_radius", 0);
-    camera.focus_distance =
-        lens ? fields.number("focus_distance") : fields.number("focus_distance", 1);
-    camera.samples_time = fields.boolean("samples_time", false);
-    camera.near_clip = fields.number("near_clip");
-    camera.far_clip = fields.number("far_clip");
-    camera.principal_point_offset = fields.vector2("principal_point_offset", {});
-    fields.finish();
-    for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-            if (std::abs(dot(camera.axes[i], camera.axes[j]) - float(i == j)) > 1e-3f)
-                refuse_value("camera['axes'] must be orthogonal unit vectors.");
-    if (!(camera.tan_half_fov_x > 0))
-        refuse_value("camera['tan_half_fov_x'] must be positive.");
-    if (!(camera.half_extent.x > 0 && camera.half_extent.y > 0))
-        refuse_value("camera['half_extent'] must be positive.");
-    if (!(camera.aperture_radius >= 0))
-        refuse_value("camera['aperture_radius'] must not be negative.");
-    if (!(camera.focus_distance > 0))
-        refuse_value("camera['focus_distance'] must be positive.");
-    if (!(camera.near_clip >= 0 && camera.far_clip > camera.near_clip))
-        refuse_value(
-            "camera['far_clip'] must exceed camera['near_clip'], which must not be "
-            "negative.");
-    return camera;
-}
-
-Film film_from(nb::handle dict) {
-    constexpr uint32_t MAX_SIDE = 1u << 16;
-    constexpr uint64_t MAX_PIXELS = 1ull << 31; // they are numbered in 32 bits
-    constexpr float MAX_RADIUS = 16; // chosen: the footprint of a sample is 33 x 33
-    Fields fields(dict, "film");
-    Film film;
-    film.width = fields.integer("width", MAX_SIDE);
-    film.height = fields.integer("height", MAX_SIDE);
-    film.crop_x = fields.integer_or("crop_x", 0, MAX_SIDE);
-    film.crop_y = fields.integer_or("crop_y", 0, MAX_SIDE);
-    film.crop_width = fields.integer_or("crop_width", film.width, MAX_SIDE);
-    film.crop_height = fields.integer_or("crop_height", film.height, MAX_SIDE);
-    film.filter =
-        fields.choice<FilterType>("filter", {{"box", FilterType::box},
-                                             {"tent", FilterType::tent},
-                                             {"gaussian", FilterType::gaussian},
-                                             {"mitchell", FilterType::mitchell},
-                                             {"catmullrom", FilterType::catmullrom},
-                                             {"lanczos", FilterType::lanczos}});
-    film.filter_radius = film.filter == FilterType::box
-                             ? fields.number("filter_radius", 0.5f)
-                             : fields.number("filter_radius");
-    film.filter_stddev = film.filter == FilterType::gaussian
-                             ? fields.number("filter_stddev")
-                             : fields.number("filter_stddev", 0.5f);
-    film.sample_border = fields.boolean("sample_border", false);
-    fields.finish();
-    if (film.crop_width == 0 || film.crop_height == 0 ||
-        film.crop_x + film.crop_width > film.width ||
-        film.crop_y + film.crop_height > film.height)
-        refuse_value("film has an empty crop or one that exceeds its width and height.");
-    if (!(film.filter_radius > 0 && film.filter_radius <= MAX_RADIUS))
-        refuse_value("film['filter_radius'] must be positive and at most 16 pixels.");
-    if (!(film.filter_stddev > 0))
-        refuse_value("film['filter_stddev'] must be positive.");
-    const PixelRect sampled = sampled_pixels(film, ReconstructionFilter(film));
-    if (uint64_t(sampled.width) * sampled.height > MAX_PIXELS)
-        refuse_value("film has more than 2^31 pixels to sample; render it crop by crop.");
-    return film;
-}
 
 void bind_scene(nb::module_ &m) {
     nb::class_<SceneHandle>(

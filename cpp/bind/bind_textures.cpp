@@ -139,6 +139,18 @@ bool is_attribute(const SceneData &scene, uint32_t number) {
            texture.type == TextureType::face_attribute;
 }
 
+// All that a material may show, NONE among them.
+std::vector<uint32_t> textures_of(const SceneData &scene, const Material &material) {
+    std::vector<uint32_t> textures{material.front_texture, material.back_texture,
+                                   material.opacity};
+    for (const uint32_t side : {material.front_specular, material.back_specular})
+        if (side != NONE) {
+            textures.push_back(scene.speculars[side].reflectance_texture);
+            textures.push_back(scene.speculars[side].transmittance_texture);
+        }
+    return textures;
+}
+
 } // namespace
 
 std::vector<Texture> textures_from(const nb::list &dicts) {
@@ -152,6 +164,12 @@ void check_textures(const SceneData &scene) {
     for (size_t i = 0; i < scene.uvs.size(); ++i)
         if (!std::isfinite(scene.uvs[i].x) || !std::isfinite(scene.uvs[i].y))
             refuse_value(numbered("uvs", i) + " must be finite.");
+    for (size_t i = 0; i < scene.emitters.size(); ++i) {
+        const Emitter &emitter = scene.emitters[i];
+        if (emitter.type == EmitterType::projector && emitter.radiance_texture != NONE &&
+            is_attribute(scene, emitter.radiance_texture))
+            refuse_value(numbered("emitters", i) + " shows an attribute of no mesh.");
+    }
     for (size_t i = 0; i < scene.shapes.size(); ++i) {
         const Shape &shape = scene.shapes[i];
         const std::string name = numbered("shapes", i);
@@ -160,15 +178,21 @@ void check_textures(const SceneData &scene) {
         const uint32_t light =
             shape.emitter == NONE ? NONE : scene.emitters[shape.emitter].radiance_texture;
         if (is_object(scene, shape)) {
-            for (const uint32_t texture :
-                 {material.front_texture, material.back_texture, material.opacity})
+            std::vector<uint32_t> shown = textures_of(scene, material);
+            shown.push_back(light);
+            for (const uint32_t texture : shown)
                 if (texture != NONE && is_attribute(scene, texture))
                     refuse_value(name + " shows an attribute, but its faces are not in the "
                                         "tree.");
             continue;
         }
+        const std::vector<uint32_t> shown = textures_of(scene, material);
         const bool textured =
-            material.is_textured() || shape.texture_coordinates || light != NONE;
+            shape.texture_coordinates || light != NONE ||
+            std::any_of(shown.begin(), shown.end(), [](uint32_t t) { return t != NONE; });
+        if (light != NONE && !scene.emitters[shape.emitter].rectangle)
+            refuse_value(name + " glows in a texture, and is neither a rectangle nor an "
+                                "analytic shape.");
         if (light != NONE && is_attribute(scene, light))
             refuse_value(name + " glows in an attribute of its mesh.");
         if (textured && scene.faces.empty())
@@ -179,8 +203,7 @@ void check_textures(const SceneData &scene) {
                     refuse_value(name + " refers to the texture coordinates of vertex " +
                                  std::to_string(vertex) + ", but there are " +
                                  std::to_string(scene.uvs.size()) + ".");
-        for (const uint32_t texture :
-             {material.front_texture, material.back_texture, material.opacity})
+        for (const uint32_t texture : shown)
             check_texture(scene, shape, name, texture);
     }
 }

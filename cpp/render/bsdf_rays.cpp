@@ -82,7 +82,7 @@ void BsdfRays::leave_out_dark(const TraceOptions &options, Counters &counters,
                               float *cost) {
     if (!looks_for_light_first(scene_))
         return;
-    const GlowingFaces &glowing = *scene_.glowing;
+    const GlowingFaces &glowing = *scene_.glowing.of(scene_.data);
     const RayGroup rays = group(cost);
     trace_any(*glowing.tree, rays, options, blocked_.data(), counters);
     if (glowing.objects)

@@ -26,7 +26,7 @@ struct SampleShares {
 
 // Whether rays are only traced if they meet something that glows.
 inline bool looks_for_light_first(const PreparedScene &scene) {
-    return scene.glowing && !scene.environment.exists();
+    return !scene.environment.exists() && scene.glowing.of(scene.data);
 }
 
 // Rays in no order. What they bring back is weighed by the power heuristic against emitter

@@ -5,12 +5,49 @@
 #include "render/textured_material.h"
 #include "render/unit_disk.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 namespace mlrt {
 
 namespace {
+
+// The mirrors and glasses of the given lanes, with the colours of their textures.
+class SpecularLanes {
+public:
+    SpecularLanes(const PreparedScene &scene, const HitPacket &hit, LaneBits lanes,
+                  const Scattering &scattering)
+        : of_scene_(scene.data.speculars), numbers_(scattering.specular) {
+        for_each_lane(lanes, [&](uint32_t lane) {
+            textured_ |= LaneBits(of_scene_[numbers_[lane]].is_textured()) << lane;
+        });
+        if (textured_ == 0)
+            return;
+        const std::vector<Texture> &textures = scene.data.textures;
+        for_each_texture_point(
+            scene, {hit.origin, hit.direction, hit.faces, hit.faces, hit.t, hit.instances},
+            textured_, [&](uint32_t lane, const TexturePoint &at) {
+                Specular &own = own_[lane];
+                own = of_scene_[numbers_[lane]];
+                if (own.reflectance_texture != NONE)
+                    own.reflectance = evaluate(textures, own.reflectance_texture, at);
+                if (own.transmittance_texture != NONE)
+                    own.transmittance = evaluate(textures, own.transmittance_texture, at);
+            });
+    }
+
+    const Specular &at(uint32_t lane) const {
+        return (textured_ >> lane) & 1u ? own_[lane] : of_scene_[numbers_[lane]];
+    }
+
+private:
+    const std::vector<Specular> &of_scene_;
+    const LaneArray<uint32_t> &numbers_;
+    LaneBits textured_ = 0;
+    std::array<Specular, PACKET_WIDTH> own_{};
+};
 
 // Samples of mirrors and glass in the given lanes.
 void add_specular(const PreparedScene &scene, const HitPacket &hit,
@@ -24,10 +61,10 @@ void add_specular(const PreparedScene &scene, const HitPacket &hit,
     // What chose to reflect at all is uniform again.
     const LaneArray<float> choice = to_lanes<float>(part / scattering.opacity);
     LaneArray<float> local[3] = {}, weight[3] = {};
+    const SpecularLanes speculars(scene, hit, lanes, scattering);
     for_each_lane(lanes, [&](uint32_t lane) {
         const SpecularSample sample =
-            sample_specular(scene.data.speculars[scattering.specular[lane]],
-                            {x[lane], y[lane], z[lane]}, choice[lane]);
+            sample_specular(speculars.at(lane), {x[lane], y[lane], z[lane]}, choice[lane]);
         for (int k = 0; k < 3; ++k) {
             local[k][lane] = sample.direction[k];
             weight[k][lane] = sample.weight[k];
@@ -68,7 +105,7 @@ Scattering scattering_of(const PreparedScene &scene, const HitPacket &hit,
                           [&](uint32_t lane) { scattering.specular[lane] = specular; });
         }
     });
-    if (scene.any_material_is_textured)
+    if (lanes & scene.textured_faces.lanes_of(hit.faces))
         add_textures(scene,
                      {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
                      lanes, seen_from_front, scattering.albedo, scattering.opacity);

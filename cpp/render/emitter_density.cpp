@@ -48,9 +48,11 @@ FloatPacket area_density(const PreparedScene &scene, uint32_t emitter,
     const FloatPacket cosine =
         dot(way * (FloatPacket(1.0f) / square_root(squared)), hits.normal);
     FloatPacket density = hits.by_area * (squared / -cosine);
-    const Shape &shape = scene.data.shapes[scene.data.emitters[emitter].shape];
-    const AnalyticShape *analytic = scene.analytic(shape);
-    if (analytic && analytic->type == AnalyticType::sphere)
+    const Emitter &light = scene.data.emitters[emitter];
+    const AnalyticShape *analytic = scene.analytic(scene.data.shapes[light.shape]);
+    // A texture is sampled by its points.
+    if (analytic && analytic->type == AnalyticType::sphere &&
+        light.radiance_texture == NONE)
         density = sphere_density(*analytic, density, hits.from);
     return select(cosine < zero, density * FloatPacket(probability(scene, emitter)), zero);
 }

@@ -151,6 +151,36 @@ EmitterSample<Real> from_point(const PointLight<Real> &light, const Real &choice
             point.direction, light.position, all_of<Real>(NONE)};
 }
 
+EmitterSample<float> from_projector(const PreparedScene &scene, uint32_t number,
+                                    float choice_weight, const Vec3f &p) {
+    const Emitter &emitter = scene.data.emitters[number];
+    EmitterSample<float> sample;
+    sample.target = emitter.position;
+    sample.target_face = NONE;
+    sample.direction = normalize(emitter.position - p);
+    sample.weight = scene.emitter_tables[number].projector.light_at(scene.data.textures, p,
+                                                                    sample.direction) *
+                    choice_weight;
+    return sample;
+}
+EmitterSample<FloatPacket> from_projector(const PreparedScene &scene, uint32_t number,
+                                          const FloatPacket &choice_weight,
+                                          const Vec3<FloatPacket> &p) {
+    EmitterSample<FloatPacket> samples;
+    samples.target = spread<FloatPacket>(scene.data.emitters[number].position);
+    samples.target_face = all_of<FloatPacket>(NONE);
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane) {
+        const EmitterSample<float> one =
+            from_projector(scene, number, choice_weight.entry(lane),
+                           Vec3f{p.x.entry(lane), p.y.entry(lane), p.z.entry(lane)});
+        for (int k = 0; k < 3; ++k) {
+            samples.direction[k].entry(lane) = one.direction[k];
+            samples.weight[k].entry(lane) = one.weight[k];
+        }
+    }
+    return samples;
+}
+
 // Mitsuba's constant.cpp and envmap.cpp, sample_direction.
 Environment::Samples sample_environment(const PreparedScene &scene, const FloatPacket &x,
                                         const FloatPacket &y) {
@@ -194,6 +224,10 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         if (density)
             *density = Real(INFINITY);
         return from_point(light_for(table.point, choice_weight), choice_weight, p);
+    case EmitterType::projector:
+        if (density)
+            *density = Real(INFINITY);
+        return from_projector(scene, number, choice_weight, p);
     case EmitterType::directional: {
         // Mitsuba's directional.cpp.
         sample.target = p - way_out(scene, p) * spread<Real>(emitter.direction);
@@ -215,8 +249,8 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         if (!(table.inverse_area > 0))
             return {spread<Real>({}), spread<Real>({}), spread<Real>({}),
                     all_of<Real>(NONE)};
-        if (const AnalyticShape *analytic =
-                scene.analytic(scene.data.shapes[emitter.shape])) {
+        const AnalyticShape *analytic = scene.analytic(scene.data.shapes[emitter.shape]);
+        if (analytic && emitter.radiance_texture == NONE) {
             const AnalyticLight<Real> light =
                 sample_analytic(scene, *analytic, number, p, x, y);
             sample.target = light.p;
@@ -231,7 +265,7 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         Real by_area(table.inverse_area);
         if (emitter.radiance_texture != NONE) {
             const LightPoint<Real> chosen = sample_textured_light(scene, number, x, y);
-            point = {chosen.p, spread<Real>(table.normal),
+            point = {chosen.p, chosen.normal,
                      all_of<Real>(scene.data.shapes[emitter.shape].first_face)};
             by_area = chosen.density;
             radiance = chosen.radiance;

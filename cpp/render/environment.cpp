@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace mlrt {
@@ -88,19 +89,38 @@ Environment::Environment(const SceneData &scene) {
     // poles; the first column once more at the end.
     const uint32_t columns = width_ + 1;
     std::vector<float> weights;
+    const float offset = found->mis_compensation ? compensation() : 0.0f;
     const float theta_scale = 1.0f / float(height_ - 1) * PI;
     for (uint32_t y = 0; y < height_; ++y) {
         const float sin_theta = std::sin(float(y) * theta_scale);
         for (uint32_t x = 0; x < columns; ++x) {
             const size_t pixel = size_t(y) * (width_ + 2) + x + 1;
             const float light = luminance(&picture_[3 * pixel]);
-            weights.push_back(std::max(light, 0.0f) * sin_theta);
+            weights.push_back(std::max(light - offset, 0.0f) * sin_theta);
         }
     }
     // The sine of single precision's pi is negative.
     for (float &weight : weights)
         weight = std::max(weight, 0.0f);
     warp_ = BilinearWarp(columns, height_, weights);
+}
+
+// Mitsuba's envmap.cpp, after Karlik et al., "MIS compensation: optimizing sampling
+// techniques in multiple importance sampling" (SIGGRAPH Asia 2019): the mean luminance,
+// unless that is all there is.
+float Environment::compensation() const {
+    constexpr float EVEN = 0.01f;
+    float least = std::numeric_limits<float>::infinity();
+    double sum = 0;
+    for (uint32_t y = 0; y < height_; ++y)
+        for (uint32_t x = 0; x < width_; ++x) {
+            const float light =
+                luminance(&picture_[3 * (size_t(y) * (width_ + 2) + x + 1)]);
+            least = std::min(least, light);
+            sum += double(light);
+        }
+    const float mean = float(sum / (double(width_) * double(height_)));
+    return mean - least <= EVEN * mean ? 0.0f : mean;
 }
 
 // (u, v) is a direction's longitude and latitude: pixels have their places in the middle

@@ -39,6 +39,8 @@ public:
     FloatPacket density(const Vec3<FloatPacket> &direction) const;
 
 private:
+    // What sampling takes off the luminance of the picture.
+    float compensation() const;
     Vec3<FloatPacket> look_up(const FloatPacket &u, const FloatPacket &v) const;
 
     bool exists_ = false;

@@ -28,7 +28,7 @@ ReconstructionFilter::ReconstructionFilter(const Film &film)
     if (type_ == FilterType::gaussian)
         fit_gaussian(film.filter_stddev);
     else if (type_ == FilterType::mitchell)
-        fit_cubic(1.0 / 3, 1.0 / 3);
+        fit_cubic(double(film.filter_b), double(film.filter_c));
     else if (type_ == FilterType::catmullrom)
         fit_cubic(0, 0.5);
 }

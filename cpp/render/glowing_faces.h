@@ -8,6 +8,7 @@
 #include "render/scene.h"
 
 #include <memory>
+#include <mutex>
 #include <optional>
 
 namespace mlrt {
@@ -21,5 +22,18 @@ struct GlowingFaces {
 // None if nothing glows, or so much that looking for it would not pay, or if some of it is
 // in instances.
 std::optional<GlowingFaces> glowing_faces(const SceneData &scene);
+
+// The same, found out when it is first asked for, by any thread.
+class LazyGlowingFaces {
+public:
+    const std::optional<GlowingFaces> &of(const SceneData &scene) const {
+        std::call_once(once_, [&] { faces_ = glowing_faces(scene); });
+        return faces_;
+    }
+
+private:
+    mutable std::once_flag once_;
+    mutable std::optional<GlowingFaces> faces_;
+};
 
 } // namespace mlrt

@@ -100,8 +100,11 @@ PointLight<float> point_light(const Emitter &emitter) {
 EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitter) {
     const SceneData &scene = prepared.data;
     EmitterTable table;
-    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point) {
+    if (emitter.type == EmitterType::projector)
+        table.projector = Projector(emitter);
+    if (emitter.type == EmitterType::spot || emitter.type == EmitterType::point)
         table.point = point_light(emitter);
+    if (is_at_point(emitter.type)) {
         // Rays from a light would also be rounded in the frames of instances, at both ends.
         table.shadow_rays_from_light = !prepared.bounds.empty() &&
                                        is_near(prepared.bounds, emitter.position) &&
@@ -113,6 +116,8 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
     const Shape &shape = scene.shapes[emitter.shape];
     if (const AnalyticShape *analytic = prepared.analytic(shape)) {
         table.inverse_area = float(1 / analytic_area(*analytic));
+        if (emitter.radiance_texture != NONE)
+            table.texture = TextureSampler(scene.textures[emitter.radiance_texture]);
         if (analytic->type == AnalyticType::disk)
             table.normal =
                 shape.flip_normals ? -disk_normal(*analytic) : disk_normal(*analytic);
@@ -145,15 +150,19 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
 
 PreparedScene::PreparedScene(SceneData scene_data)
     : data(std::move(scene_data)), plane(image_plane(data.camera, data.film)),
-      environment(data), glowing(glowing_faces(data)), bounds(bounds_of(data)) {
+      environment(data), bounds(bounds_of(data)) {
     shape_of_face.resize(data.objects ? data.objects->face_end()
                                       : data.tree->triangles.size());
     for (uint32_t i = 0; i < data.shapes.size(); ++i) {
         const Shape &shape = data.shapes[i];
-        any_shape_glows |= shape.emitter != NONE;
+        if (shape.emitter != NONE) {
+            any_shape_glows = true;
+            glowing_faces.add(shape);
+        }
         shape_materials.push_back(shape.material == NONE ? Material{}
                                                          : data.materials[shape.material]);
-        any_material_is_textured |= shape_materials.back().is_textured();
+        if (shape_materials.back().is_textured())
+            textured_faces.add(shape);
         std::fill_n(shape_of_face.begin() + shape.first_face, shape.face_count, i);
     }
 
@@ -161,8 +170,9 @@ PreparedScene::PreparedScene(SceneData scene_data)
     for (const Emitter &emitter : data.emitters) {
         emitter_tables.push_back(prepare_emitter(*this, emitter));
         weights.push_back(emitter.sampling_weight);
-        all_emitters_are_points &=
-            emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+        all_emitters_are_points &= emitter.type == EmitterType::point ||
+                                   emitter.type == EmitterType::spot ||
+                                   emitter.sampling_weight == 0;
     }
     if (std::any_of(weights.begin(), weights.end(), [](float w) { return w != 1.0f; }))
         emitter_choice = Distribution(weights);

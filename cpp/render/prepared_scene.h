@@ -4,13 +4,14 @@
 #include "render/camera.h"
 #include "render/distribution.h"
 #include "render/environment.h"
+#include "render/face_range.h"
 #include "render/glowing_faces.h"
 #include "render/point_light.h"
+#include "render/projector.h"
 #include "render/scene.h"
 #include "render/texture_sampler.h"
 
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 namespace mlrt {
@@ -23,6 +24,7 @@ struct EmitterTable {
     TextureSampler texture;    // area, with a texture: of its points
     float edge_scale = 1;      // area: a power of two, 1 unless the area is tiny
     PointLight<float> point{}; // point, spot
+    Projector projector;       // projector
     float unevenness = 0;      // rectangle: how far it lies off the plane of its first face
     bool shadow_rays_from_light = false; // of robust shadow rays: they form beams
 };
@@ -33,14 +35,14 @@ struct PreparedScene {
     std::vector<uint32_t> shape_of_face;
     std::vector<Material> shape_materials; // one a shape, black where there is none
     bool any_shape_glows = false;
-    bool any_material_is_textured = false;
-    bool all_emitters_are_points = true;      // or spots
+    FaceRange glowing_faces, textured_faces;  // the latter by their materials
+    bool all_emitters_are_points = true;      // or spots, of those that are ever chosen
     std::vector<EmitterTable> emitter_tables; // one an emitter
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
-    std::optional<GlowingFaces> glowing;
-    Box3f bounds;   // of all that rays can hit
-    Vec3f center{}; // of a sphere around the bounds
+    LazyGlowingFaces glowing; // asked for BSDF samples only
+    Box3f bounds;             // of all that rays can hit
+    Vec3f center{};           // of a sphere around the bounds
     float radius = 0;
 
     explicit PreparedScene(SceneData scene_data);

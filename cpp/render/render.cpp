@@ -20,6 +20,7 @@ void make_room(const RenderSettings &settings, size_t pixel_count, RenderResult 
     result.image = PixelArray<float>(3 * pixel_count);
     result.depth = PixelArray<float>(aovs.depth ? pixel_count : 0);
     result.normal = PixelArray<float>(aovs.normal ? 3 * pixel_count : 0);
+    result.moment = PixelArray<float>(aovs.moment ? 6 * pixel_count : 0);
     result.primitive = PixelArray<int32_t>(aovs.primitive ? pixel_count : 0);
     result.cost = PixelArray<float>(aovs.cost ? pixel_count : 0);
     std::fill_n(result.cost.data(), result.cost.size(), 0.0f);
@@ -32,6 +33,8 @@ FilmTarget film_target(RenderResult &result) {
         target.others.push_back({result.depth.data(), 1});
     for (int k = 0; k < 3 && result.normal.size() > 0; ++k)
         target.others.push_back({result.normal.data() + k, 3});
+    for (int k = 0; k < 6 && result.moment.size() > 0; ++k)
+        target.others.push_back({result.moment.data() + k, 6});
     return target;
 }
 
@@ -40,8 +43,9 @@ double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
                   double samples) {
     const double of_emitters =
         scene.all_emitters_are_points ? 0 : settings.sampling.emitter_samples;
+    const uint32_t bsdf_samples = settings.sampling.bsdf_samples;
     const double of_bsdfs =
-        looks_for_light_first(scene) ? 0 : settings.sampling.bsdf_samples;
+        bsdf_samples > 0 && looks_for_light_first(scene) ? 0 : bsdf_samples;
     return samples * (of_emitters + of_bsdfs);
 }
 

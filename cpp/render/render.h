@@ -25,6 +25,7 @@ struct RenderResult {
     PixelArray<float> image;  // red, green, blue
     PixelArray<float> depth;  // distance from the near plane along the ray; 0 for a miss
     PixelArray<float> normal; // shading normal, three a pixel; 0 for a miss
+    PixelArray<float> moment; // of samples in CIE XYZ, three a pixel, then their squares
     PixelArray<int32_t> primitive; // face that each pixel's first sample hit; -1 for a miss
     PixelArray<float> cost; // of a sample, see RayGroup: primary and shadow rays, mean
     RenderCounters counters;

@@ -52,39 +52,63 @@ enum class SpecularType : uint32_t { conductor, dielectric, thindielectric };
 struct Specular {
     SpecularType type = SpecularType::conductor;
     Vec3f reflectance{1, 1, 1}, transmittance{1, 1, 1}; // factors
+    // Indices into SceneData::textures, in place of these.
+    uint32_t reflectance_texture = NONE, transmittance_texture = NONE;
     Vec3f eta{}, k{}; // conductor: real and imaginary part of its index, by channel
     float ior = 1;    // others: index of the inside over that of the outside
+
+    bool is_textured() const {
+        return reflectance_texture != NONE || transmittance_texture != NONE;
+    }
 };
 
-enum class EmitterType : uint32_t { point, spot, directional, area, constant, envmap };
+enum class EmitterType : uint32_t {
+    point,
+    spot,
+    projector,
+    directional,
+    area,
+    constant,
+    envmap
+};
 
 // Whether the light comes from all around the scene; one emitter at most does.
 constexpr bool is_environment(EmitterType type) {
     return type == EmitterType::constant || type == EmitterType::envmap;
 }
 
+// Whether all light comes from one point.
+constexpr bool is_at_point(EmitterType type) {
+    return type == EmitterType::point || type == EmitterType::spot ||
+           type == EmitterType::projector;
+}
+
 // Whether the light comes to each point from one direction, which no ray meets by chance.
 constexpr bool has_one_direction(EmitterType type) {
-    return type == EmitterType::point || type == EmitterType::spot ||
-           type == EmitterType::directional;
+    return is_at_point(type) || type == EmitterType::directional;
 }
 
 // Light sources in the order of their declaration, which emitter sampling depends on.
 struct Emitter {
     EmitterType type = EmitterType::point;
     Vec3f radiance{}; // intensity (point, spot), irradiance (directional), radiance (area,
-                      // constant), factor of the picture (envmap)
-    Vec3f position{}; // point, spot: world space
+                      // constant), factor of the picture (envmap, projector)
+    Vec3f position{}; // point, spot, projector: world space
     Vec3f direction{0, 0,
                     1}; // spot: axis; directional: the way light travels; unit, world space
     float cutoff_angle = 0; // spot: radians, full cut-off measured from the axis
     float beam_width = 0;   // spot: radians, no fall-off inside
     uint32_t shape = NONE;  // area: the glowing shape
-    // area, on a rectangle: index into SceneData::textures, in place of `radiance`
+    // area, on a rectangle or an analytic shape: index into SceneData::textures, in place
+    // of `radiance`; projector: the picture
     uint32_t radiance_texture = NONE;
     bool rectangle = false;             // area: `rectangle` samples uniformly in its (u, v)
     Vec3f corner{}, edge_u{}, edge_v{}; // rectangle: p = corner + u * edge_u + v * edge_v
-    std::array<Vec3f, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}}; // envmap: in world space
+    // envmap, projector: in world space; the latter shines along the third
+    std::array<Vec3f, 3> axes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    Vec2f half_size{1, 1}; // projector: of its picture at distance 1
+    // envmap: light samples leave out what is darker than the mean
+    bool mis_compensation = false;
     float sampling_weight = 1; // relative probability of being chosen
 };
 
@@ -123,6 +147,7 @@ struct Film {
     FilterType filter = FilterType::box;
     float filter_radius = 0.5f; // pixels; lanczos: also the number of its lobes
     float filter_stddev = 0.5f; // gaussian: pixels
+    float filter_b = 1.0f / 3, filter_c = 1.0f / 3; // mitchell
     bool sample_border = false; // also sample a border of the filter's radius
 };
 

@@ -14,8 +14,7 @@ ShadowRays::ShadowRays(const PreparedScene &scene, uint32_t number, ShadowOffset
     : light_position_(scene.data.emitters[number].position) {
     const Emitter &emitter = scene.data.emitters[number];
     if (offset == ShadowOffset::mitsuba) {
-        from_light_ =
-            emitter.type == EmitterType::point || emitter.type == EmitterType::spot;
+        from_light_ = is_at_point(emitter.type);
         begin_ = from_light_ ? SHADOW_EPSILON : 0.0f;
         end_ = from_light_ ? 1.0f : 1.0f - SHADOW_EPSILON;
         return;

@@ -32,6 +32,30 @@ TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t 
     return at;
 }
 
+TexturePoints::TexturePoints(const PreparedScene &scene, const ShadedRays &rays,
+                             LaneBits lanes)
+    : scene_(scene), rays_(rays), on_objects_(lanes_on_objects(scene, rays.faces, lanes)) {
+    const LaneBits in_tree = lanes & ~on_objects_;
+    if (in_tree == 0)
+        return;
+    faces_ = faces_in(rays.faces, in_tree);
+    const Vec2<FloatPacket> weights =
+        barycentrics_of(rays.origin, rays.direction, corners_of(scene, faces_));
+    b_ = to_lanes<float>(weights.x);
+    c_ = to_lanes<float>(weights.y);
+}
+
+TexturePoint TexturePoints::at(uint32_t lane) const {
+    if ((on_objects_ >> lane) & 1u)
+        return object_texture_point(
+            scene_,
+            ObjectHits{rays_.origin, rays_.direction, rays_.t, rays_.faces, rays_.instances}
+                .at(lane));
+    const uint32_t face = faces_[lane];
+    return texture_point(scene_.data, scene_.data.shapes[scene_.shape_of_face[face]], face,
+                         b_[lane], c_[lane]);
+}
+
 namespace {
 
 Vec3f reflectance(const SceneData &scene, const Material &material, bool front,
@@ -58,30 +82,12 @@ bool for_each_textured_lane(const PreparedScene &scene, const ShadedRays &rays,
     });
     if (textured == 0)
         return false;
-    const auto visit_at = [&](uint32_t lane, uint32_t shape, const TexturePoint &at) {
-        visit(lane, scene.shape_materials[shape], ((seen_from_front >> lane) & 1u) != 0,
-              at);
-    };
-    const LaneBits on_objects = lanes_on_objects(scene, rays.faces, textured);
-    for_each_lane(on_objects, [&](uint32_t lane) {
-        const ObjectHit hit =
-            ObjectHits{rays.origin, rays.direction, rays.t, rays.faces, rays.instances}.at(
-                lane);
-        visit_at(lane, scene.shape_of_face[hit.face], object_texture_point(scene, hit));
-    });
-    textured &= ~on_objects;
-    if (textured == 0)
-        return true;
-    const FaceNumbers numbers = faces_in(rays.faces, textured);
-    const Vec2<FloatPacket> weights =
-        barycentrics_of(rays.origin, rays.direction, corners_of(scene, numbers));
-    const LaneArray<float> b = to_lanes<float>(weights.x), c = to_lanes<float>(weights.y);
-    for_each_lane(textured, [&](uint32_t lane) {
-        const uint32_t face = numbers[lane], shape = scene.shape_of_face[face];
-        visit_at(
-            lane, shape,
-            texture_point(scene.data, scene.data.shapes[shape], face, b[lane], c[lane]));
-    });
+    const LaneArray<uint32_t> shapes = to_lanes<uint32_t>(rays.shapes);
+    for_each_texture_point(scene, rays, textured,
+                           [&](uint32_t lane, const TexturePoint &at) {
+                               visit(lane, scene.shape_materials[shapes[lane]],
+                                     ((seen_from_front >> lane) & 1u) != 0, at);
+                           });
     return true;
 }
 

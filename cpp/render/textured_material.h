@@ -3,6 +3,7 @@
 
 #include "base/simd.h"
 #include "render/prepared_scene.h"
+#include "render/surface.h"
 #include "render/texture.h"
 
 #include <array>
@@ -27,6 +28,29 @@ Vec2f mean_coordinates(const std::vector<Vec2f> &uvs,
 // A place on a face of the tree, by the weights of its second and third vertex.
 TexturePoint texture_point(const SceneData &scene, const Shape &shape, uint32_t face,
                            float weight_b, float weight_c);
+
+// Where the given lanes of rays meet textures.
+class TexturePoints {
+public:
+    TexturePoints(const PreparedScene &scene, const ShadedRays &rays, LaneBits lanes);
+
+    TexturePoint at(uint32_t lane) const;
+
+private:
+    const PreparedScene &scene_;
+    const ShadedRays &rays_;
+    LaneBits on_objects_;
+    FaceNumbers faces_{};
+    LaneArray<float> b_{}, c_{}; // weights of the second and third vertex
+};
+
+// Calls visit(lane, at) for each of the given lanes.
+template <typename Visit>
+void for_each_texture_point(const PreparedScene &scene, const ShadedRays &rays,
+                            LaneBits lanes, Visit &&visit) {
+    const TexturePoints points(scene, rays, lanes);
+    for_each_lane(lanes, [&](uint32_t lane) { visit(lane, points.at(lane)); });
+}
 
 // The given lanes of `albedo`, those of shapes with a textured material replaced.
 Vec3<FloatPacket> textured_albedo(const PreparedScene &scene, const ShadedRays &rays,

@@ -217,7 +217,7 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
         shade_in_both_ways(hit, point, shapes, lanes, cos_view, albedo);
         return;
     }
-    if (scene_.any_material_is_textured)
+    if (lanes & scene_.textured_faces.lanes_of(hit.faces))
         albedo = textured_albedo(
             scene_, {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
             lanes, seen_from_front, albedo);
@@ -263,11 +263,12 @@ void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacke
 LaneBits TileRenderer::add_emission(const HitPacket &hit,
                                     const SurfacePoint<FloatPacket> &point,
                                     const UIntPacket &shapes, LaneBits seen_from_front) {
-    if (!scene_.any_shape_glows)
+    const LaneBits maybe = hit.lanes & scene_.glowing_faces.lanes_of(hit.faces);
+    if (maybe == 0)
         return hit.lanes;
     LaneBits hidden = 0;
     const LaneArray<uint32_t> rays = to_lanes<uint32_t>(hit.ray);
-    for_each_value(shapes, hit.lanes, [&](uint32_t shape, LaneBits holders) {
+    for_each_value(shapes, maybe, [&](uint32_t shape, LaneBits holders) {
         const uint32_t number = scene_.data.shapes[shape].emitter;
         if (number == NONE)
             return;
@@ -310,7 +311,25 @@ void TileRenderer::add_reflected_light() {
         bsdf_rays_->trace(options_, counters_.bsdf, cost, colours);
 }
 
+// Mitsuba's moment.cpp: CIE XYZ of the colours (spectrum.h, srgb_to_xyz), and the squares.
+void TileRenderer::add_moments() {
+    constexpr Vec3f TO_XYZ[3] = {{0.412453f, 0.357580f, 0.180423f},
+                                 {0.212671f, 0.715160f, 0.072169f},
+                                 {0.019334f, 0.119193f, 0.950227f}};
+    const int first = target_.channels.moment;
+    for (int k = 0; k < 3 && first >= 0; ++k) {
+        std::vector<float> &mean = values_[size_t(first + k)];
+        std::vector<float> &square = values_[size_t(first + 3 + k)];
+        for (size_t ray = 0; ray < samples_.count(); ++ray) {
+            mean[ray] =
+                dot(TO_XYZ[k], Vec3f{values_[0][ray], values_[1][ray], values_[2][ray]});
+            square[ray] = mean[ray] * mean[ray];
+        }
+    }
+}
+
 void TileRenderer::write(const PixelGroup &group) {
+    add_moments();
     std::vector<const float *> values;
     for (const std::vector<float> &channel : values_)
         values.push_back(channel.data());

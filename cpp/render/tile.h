@@ -26,13 +26,14 @@ namespace mlrt {
 struct AovSet {
     bool depth = false;
     bool normal = false;
+    bool moment = false;
     bool primitive = false;
     bool cost = false;
 };
 
 // Where each channel of the film lies; -1 if there is none.
 struct ChannelNumbers {
-    int depth = -1, normal = -1;
+    int depth = -1, normal = -1, moment = -1;
     uint32_t count = PictureFilm::COLOURS; // which come first
 
     explicit ChannelNumbers(const AovSet &aovs) {
@@ -41,6 +42,10 @@ struct ChannelNumbers {
         if (aovs.normal) {
             normal = int(count);
             count += 3;
+        }
+        if (aovs.moment) {
+            moment = int(count);
+            count += 6;
         }
     }
 };
@@ -120,6 +125,7 @@ private:
     void shade_passed(const PassingRays &passing, const Hits &hits,
                       size_t first); // as well
     void add_reflected_light();
+    void add_moments();
     void write(const PixelGroup &group);
 
     const PreparedScene &scene_;

@@ -99,7 +99,8 @@ def load_scene(
     if summary is None or summary.parsed is None or isinstance(source, Mapping):
         parsed = scene_import.parse(source, defines, VARIANT)
     else:
-        parsed = summary.parsed.of_variant(VARIANT)
+        parsed = summary.parsed
+        parsed.set_variant(VARIANT)
     if parsed.config.variant != VARIANT:
         raise UnsupportedFeature(
             f"the scene holds objects of the variant {parsed.config.variant} and needs "
@@ -112,8 +113,9 @@ def load_scene(
     integrators.check_integrator(found, lighting, force_direct)
     features.refuse_refused(root, sensor)
     check_numbers(root, sensor)
-    scene_import.check_transforms(parsed, sensor)
-    scene_import.check_files(parsed)
+    used = list(features.used_elements(root, sensor))
+    scene_import.check_transforms(used)
+    scene_import.check_files(parsed, used)
     if resolution is not None:
         scene_import.set_resolution(parsed, sensor, resolution)
     warnings = [

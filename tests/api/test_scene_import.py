@@ -254,6 +254,20 @@ def test_other_filters(scene_file: SceneFile, name: str, scalar_variant: None) -
     assert (read.filter, read.filter_radius) == (name, reference.radius())
 
 
+@pytest.mark.parametrize(("b", "c"), [(1 / 3, 1 / 3), (0.5, 0.1), (0, 0.5), (1.5, -0.3)])
+def test_parameters_of_the_mitchell_filter(
+    scene_file: SceneFile, b: float, c: float
+) -> None:
+    film = scene_files.FILM.replace(
+        '<rfilter type="box"/>',
+        f'<rfilter type="mitchell"><float name="B" value="{b}"/>'
+        f'<float name="C" value="{c}"/></rfilter>',
+    )
+    path = scene_file(sensor=f'<sensor type="perspective">{film}</sensor>')
+    read = import_scene(path).film
+    assert (read.filter_b, read.filter_c) == pytest.approx((b, c), abs=2e-6)
+
+
 def test_arrays_cannot_be_changed(scene_file: SceneFile) -> None:
     scene = import_scene(scene_file())
     for array in (scene.vertices, scene.faces, scene.normals, scene.materials):

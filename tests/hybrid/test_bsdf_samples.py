@@ -59,6 +59,9 @@ SKY = (
     '<float name="scale" value="0.7"/><transform name="to_world">'
     '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
 )
+COMPENSATED = SKY.replace(
+    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
+)
 CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 LIGHTER_BALL = BALL.replace(
     '<emitter type="area">',
@@ -114,6 +117,7 @@ CASES = {
     "disk": Case(DISK),
     "cylinder": Case(TUBE),
     "envmap": Case(SKY),
+    "compensated envmap": Case(COMPENSATED, bsdf_samples=2),
     "constant": Case(CONSTANT),
     "several lights": Case(BALL + SKY + parts.LAMP + parts.PANEL),
     "weighted lights": Case(LIGHTER_BALL + CONSTANT + parts.PANEL),

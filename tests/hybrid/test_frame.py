@@ -11,7 +11,7 @@ import numpy as np
 import plugin_scenes as parts
 import pytest
 
-from mlrt_plugin import MlrtError, MlrtWarning, prepare, render
+from mlrt_plugin import MlrtWarning, prepare, render
 from mlrt_plugin.hybrid import samplers
 from mlrt_plugin.hybrid.samplers import IndependentStream, Pass, passes
 
@@ -205,10 +205,6 @@ def test_moments_are_those_of_mitsuba(assets: Path, inner: str) -> None:
     whole = np.concatenate([result.image, result.aovs["moment"]], axis=2)
     differing = np.abs(whole - expected).max(axis=-1) > 1e-4 * expected.max()
     assert np.count_nonzero(differing) <= 2
-    native = assets / "native.xml"
-    native.write_text(parts.SCENES["native"])
-    with pytest.raises(MlrtError, match="choose shading = mitsuba"):
-        prepare(native, shading="native").render(aovs=("moment",))
 
 
 def test_mitsubas_scene_has_the_lights_and_the_bounds_only(assets: Path) -> None:

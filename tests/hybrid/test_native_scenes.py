@@ -25,9 +25,16 @@ SKY = (
     '<float name="scale" value="0.7"/><transform name="to_world">'
     '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
 )
+COMPENSATED = SKY.replace(
+    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
+)
 CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 
 
+NEVER_CHOSEN = parts.PANEL.replace(
+    '<emitter type="area">',
+    '<emitter type="area"><float name="sampling_weight" value="0"/>',
+)
 WIDE_VIEW = parts.VIEW.replace("<lookat", '<scale x="2.5" y="2.2"/><lookat')
 LENS = parts.number("aperture_radius", 0.2) + parts.number("focus_distance", 5.5)
 SHUTTER = parts.number("shutter_open", 0.1) + parts.number("shutter_close", 0.6)
@@ -39,13 +46,43 @@ SAMPLERS = {
 }
 
 
+def projector(picture: str, more: str = "", move: str = "") -> str:
+    return (
+        f'<emitter type="projector"><transform name="to_world">{move}<lookat '
+        'origin="-2, 3, 3" target="0, 0.4, 0" up="0.2, 1, 0"/></transform>'
+        f"{picture}{more}</emitter>"
+    )
+
+
+PICTURE = parts.texture("irradiance", "bitmap", parts.text("filename", "image.png"))
+BOARD = parts.texture("irradiance", "checkerboard")
+
+
 def scene(**more: str) -> str:
     return parts.scene(GLOSSLESS, integrator=NO_BSDF_SAMPLES, **more)
 
 
 SCENES = {
     "envmap": scene(lights=SKY),
+    "compensated envmap": scene(lights=COMPENSATED + parts.LAMP),
+    "projector": scene(lights=projector(PICTURE, parts.number("scale", 12))),
+    "projector by its height": scene(
+        lights=projector(PICTURE, parts.number("fov", 50) + parts.text("fov_axis", "y"))
+    ),
+    "projector that is scaled": scene(
+        lights=projector(PICTURE, move='<scale x="1.5" y="-0.7" z="2"/>')
+    ),
+    "projector of a colour": scene(lights=projector(parts.colour("irradiance"))),
+    "projector among lights": scene(
+        lights=projector(BOARD, parts.number("scale", 20)) + parts.PANEL + parts.LAMP
+    ),
     "constant": scene(lights=CONSTANT + parts.LAMP),
+    "area light that is never chosen": scene(
+        lights=parts.LAMP
+        + NEVER_CHOSEN
+        + '<emitter type="spot"><transform name="to_world"><lookat origin="-2, 4, 3" '
+        'target="0, 0, 0" up="0, 1, 0"/></transform></emitter>'
+    ),
     "envmap among lights": scene(lights=parts.PANEL + SKY + parts.LAMP),
     "thinlens": scene(eye=parts.sensor("thinlens", LENS)),
     "orthographic": scene(eye=parts.sensor("orthographic", view=WIDE_VIEW)),
@@ -114,3 +151,23 @@ def test_image_is_that_of_direct(assets: Path, name: str) -> None:
     path = assets / f"native-{name.replace(' ', '-')}.xml"
     path.write_text(SCENES[name])
     assert_parity(path)
+
+
+@pytest.mark.parametrize("rfilter", ["box", "gaussian"])
+def test_moments_are_those_of_mitsuba(assets: Path, rfilter: str) -> None:
+    """With the colours, the samples in XYZ, and their squares."""
+    path = assets / f"native-moment-{rfilter}.xml"
+    integrator = f'<integrator type="moment">{NO_BSDF_SAMPLES}</integrator>'
+    lights, eye = parts.PANEL + SKY, parts.sensor(rfilter=rfilter)
+    path.write_text(parts.scene(GLOSSLESS, lights, eye, integrator))
+    prepared = prepare(path)
+    assert prepared.shading.path == "native"
+    result = prepared.render(seed=8)
+    mi.set_variant("llvm_ad_rgb")
+    expected = np.array(mi.render(mi.load_file(str(path), optimize=False), seed=8))
+    whole = np.concatenate([result.image, result.aovs["moment"]], axis=2)
+    assert expected.shape == whole.shape and expected.shape[2] == 9
+    differing = np.abs(whole - expected) > 1e-4 * np.abs(expected).max(axis=(0, 1))
+    assert np.count_nonzero(differing.any(axis=2)) <= 3
+    noise = whole[..., 6:] - whole[..., 3:6] ** 2
+    assert noise.min() > -1e-4 and noise.max() > 1e-3

@@ -49,7 +49,7 @@ BAD: dict[str, tuple[Callable[[Arguments], None], type[Exception], str]] = {
     "unknown name": (
         changed("emitters.0.type", "sun"),
         ValueError,
-        r"point, spot, directional",
+        r"point, spot, projector, directional",
     ),
     "not a number": (changed("camera.near_clip", "x"), TypeError, r"'near_clip'.*number"),
     "not finite": (changed("emitters.0.radiance", [1, np.nan, 1]), ValueError, "finite"),
