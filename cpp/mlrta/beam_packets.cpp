@@ -15,10 +15,8 @@ namespace {
 // main axis by more than this factor; chosen.
 constexpr float GREATEST_SLOPE = 2;
 
-// Directions whose main component lies outside lose digits or overflow on the way to
-// depths, and slopes that are smaller, but not zero, on the way to where planes are
+// Slopes that are smaller, but not zero, lose digits on the way to where planes are
 // crossed.
-constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
 constexpr float SMALLEST_SLOPE = 0x1p-100f;
 
 // Where all rays go straight along the axis, there is nothing to round, but extents that
@@ -37,10 +35,6 @@ constexpr float SMALLEST_END = 0x1p-60f;
 // differ: of none of them it is certain which one is nearer.
 constexpr float SMALLEST_DISTANCE = 0x1p-125f;
 
-FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
-    return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
-}
-
 } // namespace
 
 // The axis along which the ray in the middle of those that are active moves most.
@@ -49,16 +43,20 @@ std::optional<uint32_t> BeamPackets::choose_axis(const RayGroup &rays, uint32_t 
     for (uint32_t n = 0; n < ray_count; ++n) {
         const uint32_t i = first + (n + ray_count / 2) % ray_count;
         const Vec3f d{rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-        const Vec3f size = abs(d);
         if (!(std::max(rays.t_min[i], 0.0f) < rays.t_max[i]) || !is_finite(d) ||
-            !(max_component(size) > 0))
+            !(max_component(abs(d)) > 0))
             continue;
-        const int k = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-        axes = {(k + 1) % 3, (k + 2) % 3, k};
-        side = d[k] > 0 ? 1.0f : -1.0f;
+        set_axes(d);
         return i;
     }
     return std::nullopt;
+}
+
+void BeamPackets::set_axes(Vec3f d) {
+    const Vec3f size = abs(d);
+    const int k = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    axes = {(k + 1) % 3, (k + 2) % 3, k};
+    side = d[k] > 0 ? 1.0f : -1.0f;
 }
 
 FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
@@ -142,14 +140,15 @@ void BeamPackets::turn_as_rays() {
     const float uu = sum_of_lanes(sum_uu) * share - mean_u * mean_u;
     const float uv = sum_of_lanes(sum_uv) * share - mean_u * mean_v;
     const float vv = sum_of_lanes(sum_vv) * share - mean_v * mean_v;
-    const float difference = uu - vv;
-    const float root = std::sqrt(difference * difference + 4 * uv * uv);
+    // In double, where squares of small lengths keep their digits.
+    const double difference = double(uu) - double(vv);
+    const double root = std::sqrt(difference * difference + 4 * double(uv) * double(uv));
     if (!(root > 0) || !std::isfinite(root))
         return;
-    const float double_cosine = difference / root;
-    rectangle.cosine = std::sqrt(std::max(0.5f * (1 + double_cosine), 0.0f));
+    const double double_cosine = difference / root;
+    rectangle.cosine = float(std::sqrt(std::max(0.5 * (1 + double_cosine), 0.0)));
     rectangle.sine =
-        std::copysign(std::sqrt(std::max(0.5f * (1 - double_cosine), 0.0f)), uv);
+        std::copysign(float(std::sqrt(std::max(0.5 * (1 - double_cosine), 0.0))), uv);
 }
 
 // Bounds of the slopes of each packet and of all, along the rectangle's sides.

@@ -9,7 +9,8 @@
 //
 // Common direction, but for rounding: with x relative to a point of the beam, u = x_i -
 // slope_u z and v = x_j - slope_v z with z = side x_k are the same along a ray, and -z is
-// linear in (u, v) on a plane. What is said of reciprocal depths holds for -z then.
+// linear in (u, v) on a plane. What is said of reciprocal depths holds for -z then, and
+// what is said of slopes for the lengths u and v.
 #pragma once
 
 #include "base/simd.h"
@@ -126,6 +127,15 @@ struct BeamPackets {
     }
 
 private:
+    // Directions whose main component lies outside lose digits or overflow on the way to
+    // slopes and depths.
+    static constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
+
+    static FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
+        return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
+    }
+
+    void set_axes(Vec3f direction);
     // Returns the ray that it was chosen by, if any is active.
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);
@@ -134,6 +144,9 @@ private:
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last,
                                      BeamPacket &packet, Begin &begin,
                                      FloatPacket &reach) const;
+    void load_around(uint32_t middle, const RayGroup &rays, uint32_t first,
+                     uint32_t ray_count);
+    std::optional<uint32_t> stray_of_most() const;
     void set_all_apart();
     void turn_as_film(const CameraMap &camera);
     void turn_as_rays();

@@ -61,7 +61,10 @@ private:
         else
             beam.load(rays_, first, count, camera_);
         if (!beam.any_active) {
-            trace_strays(frontier);
+            if (PARALLEL && beam.any_stray) // too little is certain of all of them
+                packets_.trace(first, count, frontier);
+            else
+                trace_strays(frontier);
             return;
         }
         if (count > SMALL_BEAM && (beam.any_stray || (!camera_ && leaves_gaps()))) {

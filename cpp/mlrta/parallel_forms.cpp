@@ -1,4 +1,5 @@
 // Triangles as a beam of parallel rays sees them.
+#include "base/exactness.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/triangle_forms.h"
@@ -13,7 +14,10 @@ namespace {
 
 // What exceeds it might overflow on the way to a form, what falls below might lose digits
 // to underflow.
-constexpr float LARGEST_BOUND = 0x1p80f, SMALLEST_AREA = 0x1p-100f;
+constexpr float LARGEST_BOUND = 0x1p80f, SMALLEST_AREA = 0x1p-80f;
+
+// More than what underflow may take from what is divided by an area.
+constexpr float UNDERFLOW = 0x1p-126f;
 
 // Bounds on errors, in units of roundoff.
 //
@@ -21,7 +25,7 @@ constexpr float LARGEST_BOUND = 0x1p80f, SMALLEST_AREA = 0x1p-100f;
 // coordinate relative to the beam and e that of an edge, sheared ones included. Vertices,
 // edges, areas and planes come from double precision: with 8 roundings of s or e in a
 // vertex or an edge, areas are good to 64 roundings of e^2, constants of edges to 64 of s
-// e, and those of planes to 64 of s e^2.
+// e, and those of planes to 128 of s e^2.
 constexpr double DOUBLE_ROUNDINGS = 64 * DOUBLE_ROUNDOFF;
 // Edges: coefficients are rounded twice, to single precision and by the product with the
 // reciprocal of the area, a form over a rectangle is evaluated with less than 16 roundings
@@ -29,6 +33,11 @@ constexpr double DOUBLE_ROUNDINGS = 64 * DOUBLE_ROUNDOFF;
 // products of roundings and the bound itself.
 constexpr float EDGE_ROUNDINGS = 48 * FLOAT_ROUNDOFF;
 // Depth: the same roundings of the sum of its three terms.
+//
+// A ray is taken to pass the triangle where it starts, at (u, v), but is within
+// `uncertainty` of it there: edges move by that times their lengths, and the depth by that
+// times its slopes. A certain hit stays one at every depth of the triangle, so it passes
+// the triangle within `uncertainty` of (u, v), where depths are at most s.
 constexpr float PLANE_ROUNDINGS = 24 * FLOAT_ROUNDOFF;
 // What is certain of the area: that no more than this share of it is error.
 constexpr float LARGEST_SHARE = 0.25f;
@@ -87,17 +96,21 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
     const Real local = maximum(along(fa), maximum(along(fb), along(fc)));
     const Real rays(std::max(std::max(-beam.slope_lo[0], beam.slope_hi[0]),
                              std::max(-beam.slope_lo[1], beam.slope_hi[1])));
-    const Real share =
-        float(DOUBLE_ROUNDINGS) * (edge * edge) * inverse_size + 2 * FLOAT_ROUNDOFF;
-    const Real uncertainty = beam.uncertainty(size);
-    const Real edge_bound = (EDGE_ROUNDINGS * (local + rays) + 2.0f * uncertainty +
-                             float(DOUBLE_ROUNDINGS) * size) *
-                            edge * inverse_size;
-    const MaskOf<Real> safe = (absolute(area) > SMALLEST_AREA) & (share <= LARGEST_SHARE) &
-                              (edge_bound < LARGEST_BOUND);
+    Real share(0.0f), uncertainty(0.0f), edge_bound(0.0f);
+    MaskOf<Real> safe = absolute(area) > SMALLEST_AREA;
+    if constexpr (EXACT) {
+        share = float(DOUBLE_ROUNDINGS) * (edge * edge) * inverse_size + 2 * FLOAT_ROUNDOFF;
+        uncertainty = beam.uncertainty(size);
+        edge_bound = ((EDGE_ROUNDINGS * (local + rays) + 2.0f * uncertainty +
+                       float(DOUBLE_ROUNDINGS) * size) *
+                          edge +
+                      UNDERFLOW) *
+                     inverse_size;
+        safe &= (share <= LARGEST_SHARE) & (edge_bound < LARGEST_BOUND);
+    }
     const LaneBits given = (1u << count) - 1;
     const LaneBits safe_bits = to_bits(safe) & given;
-    unsafe = given & ~safe_bits;
+    unsafe = EXACT ? given & ~safe_bits : 0;
     possible = 0;
     if (safe_bits == 0)
         return;
@@ -159,8 +172,10 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
             // The area's error acts on a depth of at most the size.
             const Real slopes = absolute(form_u) + absolute(form_v);
             const Real error =
-                2.0f * (PLANE_ROUNDINGS * fused(slopes, rays, absolute(form_1)) +
-                        slopes * uncertainty + 2.0f * (share * size));
+                EXACT ? 2.0f * (PLANE_ROUNDINGS * fused(slopes, rays, absolute(form_1)) +
+                                slopes * uncertainty + 2.0f * (share * size) +
+                                UNDERFLOW * inverse_size)
+                      : Real(0.0f);
             store(depth_error, error);
             store(depth_grow, Real(1.0f));
             store(depth_shrink, Real(1.0f));

@@ -1,4 +1,5 @@
 // Beams of rays with a common direction.
+#include "base/exactness.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/parallel_rays.h"
@@ -6,15 +7,12 @@
 #include "traverse/parameter_interval.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace mlrt {
 
 namespace {
-
-// Directions whose main component lies outside lose digits or overflow on the way to
-// slopes and depths.
-constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
 
 // Of a depth: the roundings of a relative coordinate, of a product and a sum, and that of a
 // distance to float.
@@ -27,10 +25,6 @@ constexpr float TINY_DEPTH = 0x1p-60f;
 // rays hit; chosen.
 constexpr float LARGEST_UNCERTAINTY = 0x1p-5f;
 
-FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
-    return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
-}
-
 Vec3f vector_of(const float *const (&components)[3], uint32_t i) {
     return {components[0][i], components[1][i], components[2][i]};
 }
@@ -40,12 +34,20 @@ Vec3f vector_of(const float *const (&components)[3], uint32_t i) {
 bool are_parallel(const RayGroup &rays) {
     if (rays.has_common_origin || rays.count == 0)
         return false;
-    const Vec3f middle = vector_of(rays.direction, rays.count / 2);
+    // The first active ray from there on, or the last ray.
+    const auto direction_at = [&](uint32_t i) {
+        while (i + 1 < rays.count &&
+               !(rays.t_min[i] < rays.t_max[i] &&
+                 max_component(abs(vector_of(rays.direction, i))) > 0))
+            ++i;
+        return vector_of(rays.direction, i);
+    };
+    const Vec3f middle = direction_at(rays.count / 2);
     const float size = max_component(abs(middle));
     for (const uint32_t i : {0u, rays.count / 4, rays.count - 1}) {
-        const Vec3f d = vector_of(rays.direction, i);
+        const Vec3f d = direction_at(i);
         const Vec3f difference = d * (size / max_component(abs(d))) - middle;
-        if (!(max_component(abs(difference)) <= LARGEST_SLOPE_DEVIATION * size))
+        if (!(max_component(abs(difference)) <= LARGEST_GROUP_DEVIATION * size))
             return false;
     }
     return true;
@@ -96,7 +98,8 @@ FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t las
                             FloatPacket &greatest) {
         const FloatPacket way = t * main;
         const FloatPacket depth = z + way;
-        const FloatPacket error = DEPTH_ROUNDINGS * (absolute(z) + way) + TINY_DEPTH;
+        const FloatPacket error =
+            EXACT ? DEPTH_ROUNDINGS * (absolute(z) + way) + TINY_DEPTH : FloatPacket(0.0f);
         // Nothing is nearer than what lies infinitely far.
         const auto far = ~(way < INFINITE);
         least = select(far, FloatPacket(-INFINITE), -(depth + error));
@@ -106,19 +109,18 @@ FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t las
     around(t_max, least, packet.greatest);
     packet.least = masked(packet.active, least, INFINITE);
     around(t_min, begin.least, begin.greatest);
+    begin.greatest = masked(packet.active, begin.greatest, -INFINITE);
     return masked(packet.active, deviates, 0.0f);
 }
 
-void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t ray_count,
-                                const Box3f &scene) {
-    parallel = true;
+// Loads rays relative to one of them, and keeps how far they deviate from it.
+void BeamPackets::load_around(uint32_t middle, const RayGroup &rays, uint32_t first,
+                              uint32_t ray_count) {
     count = 0;
     any_active = any_stray = false;
-    const std::optional<uint32_t> middle = choose_axis(rays, first, ray_count);
-    if (!middle)
-        return;
-    origin = vector_of(rays.origin, *middle);
-    const Vec3f direction = vector_of(rays.direction, *middle);
+    origin = vector_of(rays.origin, middle);
+    const Vec3f direction = vector_of(rays.direction, middle);
+    set_axes(direction);
     const auto [i, j, k] = axes;
     slope_u = direction[i] / std::abs(direction[k]);
     slope_v = direction[j] / std::abs(direction[k]);
@@ -133,16 +135,31 @@ void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t r
         any_stray |= packet.strays != 0;
         ++count;
     }
-    if (!any_active)
-        return;
-
-    const float scene_reach = std::max(max_component(abs(scene.lo - origin)),
-                                       max_component(abs(scene.hi - origin)));
     // A slope has two roundings and its deviation one; u and v have four.
     const float slopes = 1 + std::max(std::abs(slope_u), std::abs(slope_v));
     deviation = greatest_lane(most_deviation) + 4 * FLOAT_ROUNDOFF * slopes;
     origin_reach = greatest_lane(reach);
     origin_error = 8 * FLOAT_ROUNDOFF * origin_reach * slopes;
+}
+
+void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t ray_count,
+                                const Box3f &scene) {
+    parallel = true;
+    nearest = 0;
+    count = 0;
+    any_active = any_stray = false;
+    const std::optional<uint32_t> middle = choose_axis(rays, first, ray_count);
+    if (!middle)
+        return;
+    load_around(*middle, rays, first, ray_count);
+    if (any_stray)
+        if (const std::optional<uint32_t> other = stray_of_most())
+            load_around(*other, rays, first, ray_count);
+    if (!any_active)
+        return;
+
+    const float scene_reach = std::max(max_component(abs(scene.lo - origin)),
+                                       max_component(abs(scene.hi - origin)));
     rectangle = {};
     turn_as_rays();
     fit_rectangle();
@@ -150,6 +167,21 @@ void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t r
         !(uncertainty(scene_reach) <=
           LARGEST_UNCERTAINTY * std::max(rectangle.half_p, rectangle.half_q)))
         set_all_apart();
+}
+
+// A ray of those that were set apart, if these are the most: the one that the others were
+// compared with was a stray itself.
+std::optional<uint32_t> BeamPackets::stray_of_most() const {
+    int active = 0, strays = 0;
+    std::optional<uint32_t> first;
+    for (uint32_t n = 0; n < count; ++n) {
+        const BeamPacket &packet = packets[n];
+        active += std::popcount(packet.active);
+        strays += std::popcount(packet.strays);
+        if (!first && packet.strays != 0)
+            first = packet.first_ray + uint32_t(std::countr_zero(packet.strays));
+    }
+    return strays > active ? first : std::nullopt;
 }
 
 void BeamPackets::set_all_apart() {

@@ -14,8 +14,12 @@ inline constexpr float LARGEST_PARALLEL_REACH = 0x1p40f;
 // scene, they differ by up to that share of the scene that the point is off.
 inline constexpr float LARGEST_SLOPE_DEVIATION = 0x1p-12f;
 
-// Whether some of the rays, taken from all over the group, have a common direction, and
-// each its own origin: beams may be made of them, which set apart what deviates.
+// The same of rays taken from all over a group: beams of rays that deviate more would be
+// cut to pieces; chosen.
+inline constexpr float LARGEST_GROUP_DEVIATION = 0x1p-13f;
+
+// Whether some of the active rays, taken from all over the group, have a common direction,
+// and each its own origin: beams may be made of them, which set apart what deviates.
 bool are_parallel(const RayGroup &rays);
 
 } // namespace mlrt

@@ -29,7 +29,7 @@ private:
     Counters &counters_;
     std::array<float, 6> cell_; // lower and upper bounds relative to the beam's origin
 
-    // The four sides of the beam: outside where normal.x > offset + slack.
+    // The four sides of the beam: outside where normal.x > offset, which has some slack.
     Vec3<PointPacket> side_normals_;
     PointPacket side_offsets_;
     float begin_; // no ray begins at a lesser depth
