@@ -41,7 +41,7 @@ def tree_file(data: bytes) -> None:
         path.write_bytes(data)
         tree = KdTree.load(path, *scene)
     tree.report  # noqa: B018
-    for way in ("single", "packet", "adaptive"):
+    for way in ("single", "wide", "packet", "adaptive"):
         hits = tree.closest_hit(origins, directions, traversal=way)
         assert np.isin(hits.primitive, np.arange(-1, len(scene[1]))).all()
         tree.any_hit(origins, directions, traversal=way)
@@ -100,8 +100,11 @@ def mesh_arrays(vertices: Any, faces: Any, options: dict[str, Any]) -> None:
     random = np.random.default_rng(7)
     rays = random.normal(size=(2, 40, 3))
     expected = tree.closest_hit(*rays, traversal="brute_force")
-    for mine, theirs in zip(tree.closest_hit(*rays), expected, strict=True):
-        np.testing.assert_array_equal(mine, theirs)
+    for way in ("adaptive", "wide"):
+        for mine, theirs in zip(
+            tree.closest_hit(*rays, traversal=way), expected, strict=True
+        ):
+            np.testing.assert_array_equal(mine, theirs)
 
 
 def core_arrays(function: str, arguments: list[Any]) -> None:

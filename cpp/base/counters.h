@@ -1,4 +1,6 @@
-// What a traversal did. Counted per group of rays that is traced together, as in the paper.
+// What a traversal did. Counted per group of rays that is traced together, as in the paper;
+// rays that go alone, through the kd-tree or the wide tree, are groups of their own, and
+// nodes are those of either tree. A block of the wide tree counts as a leaf.
 #pragma once
 
 #include <cstdint>

@@ -115,8 +115,14 @@ void bind_tree(nb::module_ &m) {
         .def(
             "widen",
             [](const TreeHandle &self) {
-                const nb::gil_scoped_release release;
-                return self.tree->widening->make(*self.tree).bytes();
+                Watch watch;
+                const WideTree *wide;
+                {
+                    const nb::gil_scoped_release release;
+                    wide = self.tree->widening->make(*self.tree, [&] { return watch(); });
+                }
+                watch.rethrow();
+                return wide->bytes();
             },
             "Makes the tree's form for rays that go alone, unless it is there. Returns its "
             "bytes.")

@@ -4,6 +4,7 @@
 #include "bind/build_options.h"
 #include "bind/mesh_arrays.h"
 #include "bind/tree_handle.h"
+#include "bind/watch.h"
 #include "geometry/degenerate.h"
 #include "kdtree/lazy.h"
 #include "kdtree/report.h"
@@ -171,8 +172,12 @@ void bind_tree_files(nb::module_ &m) {
     m.def(
         "finish_tree",
         [](const TreeHandle &tree) {
-            const nb::gil_scoped_release release;
-            finish_growth(*tree.tree);
+            Watch watch;
+            {
+                const nb::gil_scoped_release release;
+                finish_growth(*tree.tree, [&] { return watch(); });
+            }
+            watch.rethrow();
         },
         "Builds what a lazy tree has not built yet.");
     m.def(

@@ -36,12 +36,19 @@ nb::object words_of(const HugeArray<T> &values) {
 nb::dict wide_tree(const TriangleArray &array, const nb::kwargs &options) {
     const BuiltTree built =
         *build_kd_tree(triangles_of(array), build_options_from(options));
-    const WideTree wide = make_wide_tree(built.tree);
+    const WideTree wide = *make_wide_tree(built.tree);
     nb::dict dict;
     dict["root"] = wide.root.bits();
     dict["nodes"] = words_of(wide.nodes);
     dict["blocks"] = words_of(wide.blocks);
     return dict;
+}
+
+// Whether it is made if whoever is asked says at once, or never, that it is cancelled.
+bool is_made(const TriangleArray &array, bool cancelled, const nb::kwargs &options) {
+    const BuiltTree built =
+        *build_kd_tree(triangles_of(array), build_options_from(options));
+    return make_wide_tree(built.tree, [&] { return cancelled; }).has_value();
 }
 
 // One bit a triangle: those that the ray certainly hits, and certainly misses.
@@ -80,6 +87,8 @@ void bind_wide_selftest(nb::module_ &m) {
     s.def("wide_tree", &wide_tree, nb::arg("triangles"), nb::arg("options"),
           "The bits of the root, and nodes (N, 64) and blocks (N, 80) as 32-bit words as "
           "they lie in memory.");
+    s.def("is_made", &is_made, nb::arg("triangles"), nb::arg("cancelled"),
+          nb::arg("options"));
     s.def("decided", &decided);
     s.attr("max_wide_depth") = MAX_WIDE_DEPTH;
 }

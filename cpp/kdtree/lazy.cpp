@@ -216,17 +216,19 @@ std::vector<uint32_t> LazyGrowth::unbuilt_nodes() const {
     return unbuilt;
 }
 
-void LazyGrowth::finish() {
+bool LazyGrowth::finish(const std::function<bool()> &cancelled) {
     // Large cells are split first and finished in a later round, each part by a thread; and
     // rays of other threads may leave behind new cells.
     for (;;) {
         const std::vector<uint32_t> unbuilt = unbuilt_nodes();
         if (unbuilt.empty())
-            return;
-        parallel_for(uint32_t(unbuilt.size()), [&](uint32_t i) {
+            return true;
+        const auto build_one = [&](uint32_t i) {
             build(unbuilt[i],
                   load_node(nodes_[unbuilt[i]]).reference_count() <= MAX_FINISH_REFERENCES);
-        });
+        };
+        if (!parallel_for(uint32_t(unbuilt.size()), build_one, cancelled))
+            return false;
     }
 }
 
@@ -244,9 +246,8 @@ KdNode KdTree::built_node(uint32_t index) const {
     return growth->build(index, false);
 }
 
-void finish_growth(const KdTree &tree) {
-    if (tree.growth)
-        tree.growth->finish();
+bool finish_growth(const KdTree &tree, const std::function<bool()> &cancelled) {
+    return !tree.growth || tree.growth->finish(cancelled);
 }
 
 void build_lazy(KdTree &tree, BuildReport &report, HugeArray<Reference> references,

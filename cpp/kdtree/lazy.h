@@ -15,6 +15,7 @@
 
 #include <atomic>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <vector>
@@ -53,7 +54,8 @@ public:
     KdNode build(uint32_t index, bool whole);
 
     // Builds all that is not built, by all threads, whatever others ask for meanwhile.
-    void finish();
+    // Returns whether it was not cancelled, see finish_growth().
+    bool finish(const std::function<bool()> &cancelled);
 
     // What was done since the tree was made; the figures of the whole tree are missing.
     BuildReport report() const;
@@ -114,7 +116,9 @@ public:
 void build_lazy(KdTree &tree, BuildReport &report, HugeArray<Reference> references,
                 const BuildFrame &frame, const Interruption &interruption);
 
-// Builds what a lazy tree has not built yet; does nothing for other trees.
-void finish_growth(const KdTree &tree);
+// Builds what a lazy tree has not built yet; does nothing for other trees. Returns whether
+// it was not cancelled, which is asked on the calling thread only: what is built stays, and
+// a cell that has begun is built to its end.
+bool finish_growth(const KdTree &tree, const std::function<bool()> &cancelled = {});
 
 } // namespace mlrt

@@ -4,6 +4,7 @@
 #include "base/denormals.h"
 #include "base/parallel.h"
 #include "geometry/clip.h"
+#include "kdtree/interruption.h"
 #include "kdtree/lazy.h"
 #include "kdtree/reference.h"
 #include "kdtree/sah.h"
@@ -12,6 +13,7 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <utility>
@@ -94,12 +96,15 @@ auto before_on(int axis) {
 // Makes parts of the wide tree, from the leaves up.
 class WideMaker {
 public:
-    WideMaker(const KdTree &tree, WideArrays &arrays) : tree_(tree), arrays_(arrays) {}
+    WideMaker(const KdTree &tree, WideArrays &arrays, const Interruption &interruption)
+        : tree_(tree), arrays_(arrays), interruption_(interruption) {}
 
+    // Throws Cancelled.
     WidePart part_of(uint32_t index, const Box3f &cell) {
         const KdNode node = tree_.node(index);
         if (node.is_leaf())
             return part_of_leaf(node, cell);
+        interruption_.check();
         const int axis = node.axis();
         WidePart lower = part_of(node.lower_child(), lower_part(cell, axis, node.split()));
         WidePart upper =
@@ -167,6 +172,7 @@ private:
                 part.add(fragment.number, fragment.box);
             return part;
         }
+        interruption_.check();
         const auto [axis, count] =
             list.size() <= MOST_TRIED ? best_division(list) : middle(list);
         WidePart first = part_of_list(list.first(count));
@@ -236,6 +242,7 @@ private:
 
     const KdTree &tree_;
     WideArrays &arrays_;
+    const Interruption &interruption_;
     SharedArray<WideNode>::Share nodes_;
     SharedArray<WideBlock>::Share blocks_;
     std::vector<Fragment> fragments_;
@@ -245,15 +252,22 @@ private:
 // Deals out the subtrees at a depth of the kd-tree, and joins what is made of them.
 class Dealer {
 public:
-    Dealer(const KdTree &tree, WideArrays &arrays) : tree_(tree), arrays_(arrays) {}
+    Dealer(const KdTree &tree, WideArrays &arrays, const Interruption &interruption)
+        : tree_(tree), arrays_(arrays), interruption_(interruption) {}
 
+    // Throws Cancelled.
     WideChild make() {
         list_subtrees(0, tree_.bounds, DEALT_DEPTH);
-        parallel_for(uint32_t(subtrees_.size()), [&](uint32_t i) {
-            const auto [node, cell] = subtrees_[i];
-            parts_[i] = WideMaker(tree_, arrays_).part_of(node, cell);
-        });
-        WideMaker top(tree_, arrays_);
+        parallel_for(
+            uint32_t(subtrees_.size()),
+            [&](uint32_t i) {
+                const auto [node, cell] = subtrees_[i];
+                WideMaker maker(tree_, arrays_, interruption_);
+                parts_[i] = maker.part_of(node, cell);
+            },
+            [&] { return interruption_(); });
+        interruption_.check();
+        WideMaker top(tree_, arrays_, interruption_);
         WidePart root = join_subtrees(top, 0, DEALT_DEPTH);
         return top.close(root);
     }
@@ -294,6 +308,7 @@ private:
 
     const KdTree &tree_;
     WideArrays &arrays_;
+    const Interruption &interruption_;
     std::vector<Subtree> subtrees_;
     std::vector<WidePart> parts_;
     size_t joined_ = 0;
@@ -301,17 +316,22 @@ private:
 
 } // namespace
 
-WideTree make_wide_tree(const KdTree &tree) {
+std::optional<WideTree> make_wide_tree(const KdTree &tree,
+                                       const std::function<bool()> &cancelled) try {
     const KeepDenormals keep_denormals;
-    finish_growth(tree);
+    const Interruption interruption(cancelled);
+    if (!finish_growth(tree, [&] { return interruption(); }))
+        return std::nullopt;
     const uint64_t references =
         tree.growth ? tree.growth->state().references : tree.references.size();
     WideArrays arrays(references);
     WideTree wide;
-    wide.root = Dealer(tree, arrays).make();
+    wide.root = Dealer(tree, arrays, interruption).make();
     wide.nodes = arrays.nodes.finished();
     wide.blocks = arrays.blocks.finished();
     return wide;
+} catch (const Cancelled &) {
+    return std::nullopt;
 }
 
 } // namespace mlrt

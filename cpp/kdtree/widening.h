@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 
@@ -21,12 +22,16 @@ public:
     void miss(uint64_t rays) { missed_.fetch_add(rays, std::memory_order_relaxed); }
 
     // Makes it by all threads, if it has not been made, for the kd-tree that this belongs
-    // to. From any thread but those of a parallel loop. Throws as make_wide_tree().
-    const WideTree &make(const KdTree &tree);
+    // to. From any thread but those of a parallel loop. Gives nothing if it was cancelled,
+    // which is asked on the calling thread only, also while another thread makes it. Throws
+    // as make_wide_tree().
+    const WideTree *make(const KdTree &tree, const std::function<bool()> &cancelled = {});
 
     // The same if `rays` that are about to be traced, and those that have missed it, are
-    // worth it, and there is room. Lazy trees are left as they are.
-    void make_for(const KdTree &tree, uint64_t rays);
+    // worth it, and there is room. Lazy trees are left as they are. Returns whether it was
+    // not cancelled.
+    bool make_for(const KdTree &tree, uint64_t rays,
+                  const std::function<bool()> &cancelled = {});
 
 private:
     std::atomic<const WideTree *> tree_{nullptr};

@@ -14,6 +14,9 @@ namespace mlrt {
 
 // Of rays with one common origin. Neighbouring packets mostly hit the same triangles: their
 // planes are kept in a small direct-mapped table.
+//
+// Pairs of floats take less time than double precision, of which a register holds half as
+// many, and which rays must be converted to. They round nearly all distances for certain.
 class HitDistances {
 public:
     HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {}
@@ -25,21 +28,21 @@ public:
                    const UIntPacket &primitives, Counters &counters);
 
 private:
-    // The distance is numerator / normal.d. Relative to it, the error of the quotient is at
-    // most `share`, plus `denominator_share` times the greatest absolute component of d by
-    // the size of the denominator.
+    // The distance is 1 / normal.d, of a normal that is the sum of two floats. Relative to
+    // it, the error of the computed one is at most `share`, plus `direction_share` times
+    // the greatest absolute component of d by the size of normal.d.
     struct Plane {
+        float normal[4], rest[4]; // the fourth is any number
+        float share, direction_share;
         uint32_t primitive;
-        Vec3d normal;
-        double numerator;
-        float share, denominator_share;
 
         Plane(uint32_t number, const Triangle &triangle, Vec3f origin);
     };
 
     const Plane &plane_of(uint32_t primitive);
+    float of_one(Vec3f direction, uint32_t primitive, Counters &counters) const;
 
-    static constexpr uint32_t SIZE = 16;
+    static constexpr uint32_t SIZE = 64;
 
     const KdTree &tree_;
     Vec3f origin_;

@@ -49,6 +49,19 @@ double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
     return samples * (of_emitters + of_bsdfs);
 }
 
+// Makes the wide tree for a picture that asks for it, or if it is worth it. Returns whether
+// it was not cancelled.
+bool widen(const PreparedScene &scene, const RenderSettings &settings, double samples,
+           const std::function<bool()> &cancelled) {
+    const KdTree &tree = *scene.data.tree;
+    if (settings.trace.traversal == Traversal::wide)
+        return tree.widening->make(tree, cancelled) != nullptr;
+    if (settings.trace.traversal == Traversal::adaptive)
+        return tree.widening->make_for(tree, uint64_t(rays_alone(scene, settings, samples)),
+                                       cancelled);
+    return true;
+}
+
 } // namespace
 
 bool render(const PreparedScene &scene, const RenderSettings &settings,
@@ -67,11 +80,8 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
 
     const double all_samples =
         double(sampled.width) * sampled.height * settings.samples_per_pixel;
-    if (settings.trace.traversal == Traversal::wide)
-        scene.data.tree->widening->make(*scene.data.tree);
-    else if (settings.trace.traversal == Traversal::adaptive)
-        scene.data.tree->widening->make_for(
-            *scene.data.tree, uint64_t(rays_alone(scene, settings, all_samples)));
+    if (!widen(scene, settings, all_samples, [&] { return cancelled && cancelled(0); }))
+        return false;
     std::atomic<uint64_t> samples_done{0};
     std::atomic<bool> stop{false};
     const auto ask = [&] {

@@ -14,6 +14,7 @@
 #include "base/exactness.h"
 #include "base/simd.h"
 #include "base/vec.h"
+#include "geometry/triangle_test.h"
 
 #include <limits>
 
@@ -27,6 +28,14 @@ inline constexpr float WIDEN_NEAR = 1 - SLACK;
 inline constexpr float TINY_PARAMETER = 0x1p-100f;
 
 inline constexpr float INFINITE = std::numeric_limits<float>::infinity();
+
+// The latest distance that may be rounded to t, but for the margin of the invariant: a
+// denormal t is off by more than that share. No parameter beyond it is of interest once
+// there is a hit at t.
+template <typename Real>
+Real latest_distance(Real t) {
+    return t + SMALLEST_FLOAT;
+}
 
 template <typename Real>
 struct ParameterInterval {

@@ -59,18 +59,13 @@ Hit finished(Hit best) {
     return best.primitive == NO_PRIMITIVE ? Hit{} : best;
 }
 
-// Parameter of the latest distance that may be rounded to t, but for the margin of
-// ParameterInterval: a denormal t is off by more than that share.
-float latest_parameter(float t, double inverse_scale) {
-    return float((double(t) + SMALLEST_FLOAT) * inverse_scale);
-}
-
 // Planes are intersected with a ray whose largest direction component lies in [0.5, 1):
 // scaling by a power of two changes no rounding, and its parameter is t / scale.
 struct ScaledRay {
     Vec3f reciprocal;
     double inverse; // one over what it was scaled by
 
+    ScaledRay() = default;
     explicit ScaledRay(Vec3f direction) {
         int exponent = 0;
         std::frexp(max_component(abs(direction)), &exponent);
@@ -86,7 +81,10 @@ struct ScaledRay {
     }
 
     float parameter(float t) const { return float(t * inverse); }
-    float latest_parameter(float t) const { return mlrt::latest_parameter(t, inverse); }
+    // That of the latest distance that may be rounded to t.
+    float latest_parameter(float t) const {
+        return float(latest_distance(double(t)) * inverse);
+    }
 };
 
 // A ray on its way through a subtree.
@@ -97,17 +95,15 @@ public:
         ray_ = ray;
         number_ = number;
         best_ = {ray.t_max, NO_PRIMITIVE};
-        const ScaledRay scaled(ray.direction);
-        inverse_scale_ = scaled.inverse;
-        interval_ = {scaled.parameter(ray.t_min) * WIDEN_NEAR,
-                     scaled.latest_parameter(ray.t_max) * WIDEN_FAR + TINY_PARAMETER};
-        search_end_ = scaled.latest_parameter(ray.t_max);
+        scaled_ = ScaledRay(ray.direction);
+        search_end_ = scaled_.latest_parameter(ray.t_max);
+        interval_ = {scaled_.parameter(ray.t_min) * WIDEN_NEAR,
+                     search_end_ * WIDEN_FAR + TINY_PARAMETER};
         for (int k = 0; k < 3; ++k) {
-            axes_[k] = {ray.origin[k], scaled.reciprocal[k],
-                        std::signbit(scaled.reciprocal[k])};
-            interval_ =
-                clip_to_slab(interval_, entry.cell.lo[k] - ray.origin[k],
-                             entry.cell.hi[k] - ray.origin[k], scaled.reciprocal[k]);
+            const float reciprocal = scaled_.reciprocal[k];
+            axes_[k] = {ray.origin[k], reciprocal, std::signbit(reciprocal)};
+            interval_ = clip_to_slab(interval_, entry.cell.lo[k] - ray.origin[k],
+                                     entry.cell.hi[k] - ray.origin[k], reciprocal);
         }
         pending_ = 0;
         node_ = entry.node;
@@ -125,7 +121,7 @@ public:
                 test_leaf(tree, ray_, node, best_, counters);
                 if (query == Query::any && best_.primitive != NO_PRIMITIVE)
                     return false;
-                search_end_ = latest_parameter(best_.t, inverse_scale_);
+                search_end_ = scaled_.latest_parameter(best_.t);
             }
             do {
                 if (pending_ == 0)
@@ -172,7 +168,7 @@ private:
     Ray ray_;
     size_t number_;
     Hit best_;
-    double inverse_scale_;
+    ScaledRay scaled_;
     float search_end_; // no parameter beyond it is of interest
     uint32_t node_, pending_;
     ParameterInterval<float> interval_;

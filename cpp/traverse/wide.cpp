@@ -35,7 +35,7 @@ public:
         t_min_ = rays.t_min[number];
         best_ = {rays.t_max[number], NO_PRIMITIVE};
         search_from_ = t_min_ * WIDEN_NEAR;
-        search_end_ = latest_parameter(best_.t);
+        search_end_ = latest_distance(best_.t);
         pending_ = 1;
         nears_[0] = search_from_;
         children_[0] = tree.root.bits();
@@ -100,17 +100,13 @@ public:
         });
         if (QUERY == Query::any && best_.primitive != NO_PRIMITIVE)
             pending_ = 0;
-        search_end_ = latest_parameter(best_.t);
+        search_end_ = latest_distance(best_.t);
     }
 
     uint32_t number() const { return number_; }
     Hit hit() const { return best_.primitive == NO_PRIMITIVE ? Hit{} : best_; }
 
 private:
-    // Parameter of the latest distance that may be rounded to t, but for the margin of
-    // ParameterInterval: a denormal t is off by more than that share.
-    static float latest_parameter(float t) { return t + SMALLEST_FLOAT; }
-
     void test(const Triangle &triangle, uint32_t primitive, bool certainly_hit,
               Counters &counters) {
         if (!certainly_hit) {

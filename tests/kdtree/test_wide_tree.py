@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import itertools
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from fractions import Fraction
+from types import FrameType
 
 import numpy as np
 import numpy.typing as npt
@@ -183,6 +186,42 @@ def test_rays_with_a_common_origin_leave_it_alone() -> None:
     assert tree.report["wide_bytes"] == 0
     bytes_of_it = tree.widen()
     assert tree.report["wide_bytes"] == bytes_of_it > 0
+
+
+@each_builder
+def test_it_is_not_made_once_it_is_cancelled(builder: str) -> None:
+    vertices, faces = workloads.sphere(4)
+    triangles = vertices[faces]
+    assert core.wide_selftest.is_made(triangles, False, builder=builder)
+    assert not core.wide_selftest.is_made(triangles, True, builder=builder)
+
+
+def widen_with_signal(tree: mlrt_plugin.KdTree) -> None:
+    """Makes the wide tree; a signal comes soon after that begins."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        with pytest.raises(KeyboardInterrupt):
+            tree.widen()
+            time.sleep(1)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_signal_ends_its_making() -> None:
+    # Signals are looked for about ten times a second: it must take a while on any machine.
+    for subdivisions in (7, 8, 9):
+        tree = mlrt_plugin.KdTree(*workloads.sphere(subdivisions), builder="fast")
+        widen_with_signal(tree)
+        if tree.report["wide_bytes"] == 0:
+            break
+    assert tree.report["wide_bytes"] == 0
+    assert tree.widen() == tree.report["wide_bytes"] > 0
 
 
 def test_denormal_numbers_count_when_it_is_made() -> None:

@@ -168,6 +168,35 @@ def test_lazy_trees_are_finished_while_others_ask() -> None:
                 hits.assert_same(expected)
 
 
+def widen(tree: Any, sizes: list[int]) -> None:
+    sizes.append(tree.widen())
+
+
+@each_builder
+@pytest.mark.parametrize("pool", [1, 2, 8])
+def test_one_wide_tree_while_many_threads_ask(builder: str, pool: int) -> None:
+    """For it, for hits by it, and by rays enough to make it."""
+    rng = np.random.default_rng(SEED)
+    scene = workloads.soup(rng, 1000, 0.1)
+    rays = workloads.all_rays(rng, scene, 600)
+    expected = closest(tree_of("exact", scene), rays, TRAVERSALS["packet"])
+    ways = [TRAVERSALS[name] for name in ("wide", "wide", "adaptive")]
+    with thread_count(pool):
+        for _ in range(8):
+            tree = tree_of(builder, scene)
+            sizes: list[int] = []
+            asking = [threading.Thread(target=widen, args=(tree, sizes)) for _ in range(2)]
+            for thread in asking:
+                thread.start()
+            found = Callers(tree, [(rays, way) for way in ways]).run()
+            for thread in asking:
+                thread.join()
+            assert sizes == [tree.widen()] * 2
+            for hits in found:
+                assert hits is not None, f"seed {SEED}: a thread failed"
+                hits.assert_same(expected)
+
+
 def part(rays: Rays, order: npt.NDArray[np.int64]) -> Rays:
     return np.ascontiguousarray(rays[0][order]), np.ascontiguousarray(rays[1][order])
 

@@ -17,6 +17,9 @@ from .closed_meshes import FAR, sphere
 FloatArray = npt.NDArray[np.float32]
 Rays = tuple[FloatArray, FloatArray]
 GRID = 2.0**-10
+SCALE = 96
+"""Power of two that lengthens or shortens directions which are out of scale; those of other
+rays differ from 1 by less than half as much."""
 
 
 @dataclass(frozen=True)
@@ -176,6 +179,15 @@ def grazing(rng: np.random.Generator, scene: SmallScene, count: int) -> Rays:
     return (a - np.float32(2) * directions).astype(np.float32), directions
 
 
+def out_of_scale(rng: np.random.Generator, scene: SmallScene, count: int) -> Rays:
+    """At vertices and edges, by directions so long or so short that single precision could
+    lose planes."""
+    half = count // 2
+    parts = at_vertices(rng, scene, half), at_edges(rng, scene, count - half)
+    origins, directions = (np.concatenate(both) for both in zip(*parts, strict=True))
+    return origins, np.ldexp(directions, rng.choice([-SCALE, SCALE], (count, 1)))
+
+
 def anywhere(rng: np.random.Generator, scene: SmallScene, count: int) -> Rays:
     """As a control: at random points of the scene's box."""
     return towards(outside(rng, scene, count), inside(rng, scene, count))
@@ -187,6 +199,7 @@ RAYS: tuple[Callable[[np.random.Generator, SmallScene, int], Rays], ...] = (
     along_axes,
     from_planes,
     grazing,
+    out_of_scale,
     anywhere,
 )
 
@@ -195,4 +208,7 @@ def shared_origin(rays: Rays, every: int) -> Rays:
     """The same with one origin for each `every` rays in a row, aimed as they were."""
     origins, directions = rays
     first = np.arange(len(origins)) // every * every
-    return towards(origins[first], origins + directions)
+    length = np.frexp(np.abs(directions).max(axis=1, keepdims=True))[1]
+    power = SCALE * np.round(length / SCALE).astype(int)
+    origin, to_target = towards(origins[first], origins + np.ldexp(directions, -power))
+    return origin, np.ldexp(to_target, power)

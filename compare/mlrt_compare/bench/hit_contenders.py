@@ -19,6 +19,12 @@ HitArrays = tuple[FloatArray, npt.NDArray[np.int64]]
 """Distances (N,), inf for a miss, and faces (N,), -1 for one."""
 
 BACKGROUND = 0xFFFFFFFF
+TRAVERSALS = {
+    MLRT: "adaptive",
+    f"{MLRT}, wide tree": "wide",
+    f"{MLRT}, single rays": "single",
+}
+"""MLRT as usual, and each ray alone, through either tree."""
 
 
 @dataclass(frozen=True)
@@ -32,16 +38,20 @@ class HitContender:
 def hit_contenders(
     native: Native, vertices: FloatArray, faces: npt.NDArray[np.uint32], threads: int
 ) -> list[HitContender]:
-    """MLRT first. Embree is asked in packets of 16, as Mitsuba asks it, of scenes of build
-    quality MEDIUM, which is Mitsuba's."""
+    """MLRT first, by each of TRAVERSALS. Embree is asked in packets of 16, as Mitsuba asks
+    it, of scenes of build quality MEDIUM, which is Mitsuba's."""
     tree = KdTree(vertices, faces)
 
-    def mlrt(origins: FloatArray, directions: FloatArray) -> HitArrays:
-        hits = tree.closest_hit(origins, directions)
-        return hits.t, hits.primitive.astype(np.int64)
+    def mlrt(traversal: str) -> Callable[[FloatArray, FloatArray], HitArrays]:
+        def closest_hit(origins: FloatArray, directions: FloatArray) -> HitArrays:
+            hits = tree.closest_hit(origins, directions, traversal=traversal)
+            return hits.t, hits.primitive.astype(np.int64)
+
+        return closest_hit
 
     mesh = native.module.Mesh(vertices, faces)
-    return [HitContender(MLRT, mlrt), *embree_contenders(native, mesh, threads)]
+    own = [HitContender(name, mlrt(traversal)) for name, traversal in TRAVERSALS.items()]
+    return [*own, *embree_contenders(native, mesh, threads)]
 
 
 def embree_contenders(native: Native, mesh: Any, threads: int) -> list[HitContender]:

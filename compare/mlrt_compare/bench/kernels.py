@@ -35,6 +35,7 @@ KERNELS = {
 USUAL = "MLRT as usual"
 TRAVERSALS: dict[str, dict[str, Any]] = {
     "single rays": {"traversal": "single", "entry_points": False},
+    "wide tree": {"traversal": "wide"},
     "packets": {"traversal": "packet", "entry_points": False},
     "packets, entry points": {"traversal": "packet"},
     "intervals": {"traversal": "interval", "entry_points": False},

@@ -28,7 +28,7 @@ NEIGHBOURS = 2 * SHARING
 """Faces along a curve through space that rays of one origin are aimed at: so many that few
 rays are the same, so few that beams are narrow."""
 OTHERS = 16
-"""Those who are only there to compare with MLRT trace one batch in so many."""
+"""All but the first contender, MLRT as usual, trace one batch in so many."""
 KEPT = 5
 """Leaks of each kind that are kept, so that they can be traced again."""
 

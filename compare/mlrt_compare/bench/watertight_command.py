@@ -15,7 +15,7 @@ from .checkout import find_checkout
 from .closed_meshes import ClosedMesh, chosen_meshes, usual_meshes
 from .errors import BenchError
 from .figures import measure_scenes, new_figures, show, write_json
-from .hit_contenders import hit_contenders
+from .hit_contenders import TRAVERSALS, hit_contenders
 from .machine import machine_record
 from .native import Native, load_native
 from .options import default_cache
@@ -51,7 +51,7 @@ def run(options: argparse.Namespace) -> bool:
     figures["total"] = total(finished(figures))
     show(["", *total_lines(figures["total"])])
     write_json(options.json, figures)
-    return bool(figures["total"]["leaks"]["MLRT"] == 0)
+    return not any(figures["total"]["leaks"][name] for name in TRAVERSALS)
 
 
 def finished(figures: dict[str, Any]) -> list[dict[str, Any]]:
