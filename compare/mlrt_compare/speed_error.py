@@ -200,7 +200,8 @@ def rounds(
 
     frames: (S,) in a row, with nothing between them. Of these the time is the mean and the
     error that of the last. Both renderers take the same seeds, other ones for each frame,
-    and begin in turns. The noise of a reference, which adds to every MSE, is taken off.
+    and begin in turns. Seeds of errors do not depend on how many frames come before, which
+    is a matter of time. The noise of a reference, which adds to every MSE, is taken off.
     """
     shape = (2, len(plan.spp), plan.rounds)
     seconds, rel_mse, mse = np.empty(shape), np.empty(shape), np.empty((2, *shape))
@@ -208,10 +209,12 @@ def rounds(
     by_mitsuba, by_mlrt = references[1], references[0]
     weights = 1 / (by_mitsuba.mean**2 + REL_MSE_EPSILON)
     noise_of_rel = float(np.mean(by_mitsuba.variance * weights))
-    seeds = iter(spread_seeds(settings.seed, plan.rounds * sum(frames)))
+    seeds = spread_seeds(settings.seed, plan.rounds * sum(frames))
+    judged = iter(seeds[: plan.rounds * len(frames)])
+    timed_only = iter(seeds[plan.rounds * len(frames) :])
     for number in range(plan.rounds):
         for index, spp in enumerate(plan.spp):
-            in_a_row = list(itertools.islice(seeds, frames[index]))
+            in_a_row = [*itertools.islice(timed_only, frames[index] - 1), next(judged)]
             order = (0, 1) if (number + index) % 2 == 0 else (1, 0)
             for side in order:
                 at = (side, index, number)
