@@ -73,11 +73,9 @@ def test_agreeing_images_pass_and_leave_their_files(tmp_path: Path) -> None:
 
 
 def test_report_is_a_page_with_the_plot_of_the_folder(tmp_path: Path) -> None:
+    point = {"spp": 1, "median": 2, "minimum": 1, "mse": 3, "seconds": [1, 2, 3]}
     figures = {
-        "sides": [
-            {"name": name, "points": [{"spp": 1, "median": 2, "minimum": 1, "mse": 3}]}
-            for name in ("MLRT", "Mitsuba")
-        ],
+        "sides": [{"name": name, "points": [point]} for name in ("MLRT", "Mitsuba")],
         **{key: {"value": 2, "low": 1, "high": 3} for key in ("equal_time", "equal_error")},
         "machine": {"time": "then"},
         "scene": "box",
