@@ -43,11 +43,6 @@ constexpr float PLANE_ROUNDINGS = 24 * FLOAT_ROUNDOFF;
 constexpr float LARGEST_SHARE = 0.25f;
 
 template <typename Real>
-Real largest_component(const Vec3<Real> &v) {
-    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
-}
-
-template <typename Real>
 Vec3<Real> in_single(const Vec3<DoubleOf<Real>> &v) {
     return {Real(v.x), Real(v.y), Real(v.z)};
 }

@@ -37,11 +37,6 @@ constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
 // What is certain of the volume: that no more than this share of it is error.
 constexpr float LARGEST_SHARE = 0.25f;
 
-template <typename Real>
-Real largest_component(const Vec3<Real> &v) {
-    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
-}
-
 } // namespace
 
 template <typename Real>

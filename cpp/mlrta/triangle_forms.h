@@ -22,6 +22,12 @@
 
 namespace mlrt {
 
+// The greatest absolute value of a component.
+template <typename Real>
+Real largest_component(const Vec3<Real> &v) {
+    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
+}
+
 struct alignas(64) TriangleForms {
     static constexpr uint32_t CAPACITY = WIDE_WIDTH;
     static constexpr int DEPTH = 3; // after the three edges

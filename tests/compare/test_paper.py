@@ -12,7 +12,7 @@ import pytest
 import repository
 from mlrt_compare.bench.frame_runs import FrameRun
 from mlrt_compare.bench.measure import Timing
-from mlrt_compare.bench.scenes import BenchScene, imported
+from mlrt_compare.bench.scenes import BenchScene
 from mlrt_compare.cli import main
 from mlrt_compare.paper.counts import counts_of
 from mlrt_compare.paper.frame_times import summary
@@ -24,13 +24,7 @@ from mlrt_compare.paper.tables import count_ways
 from mlrt_compare.paper.text import markdown
 from PIL import Image as Pillow
 
-OFFICE = repository.ROOT / "scenes" / "office" / "office.xml"
 SIDE = 64
-
-
-@pytest.fixture(scope="module")
-def office() -> BenchScene:
-    return imported("office", OFFICE)
 
 
 @pytest.fixture(scope="module")

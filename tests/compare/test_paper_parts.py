@@ -6,9 +6,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-import repository
 from mlrt_compare.bench.camera_rays import camera_rays
-from mlrt_compare.bench.scenes import BenchScene, imported
+from mlrt_compare.bench.scenes import BenchScene
 from mlrt_compare.paper import scenes as paper_scenes
 from mlrt_compare.paper.ablation import ablate_culling, ablate_tree
 from mlrt_compare.paper.grouping import groupings
@@ -18,13 +17,7 @@ from mlrt_compare.paper.sections import rate
 from mlrt_compare.paper.tile_sweep import Tiles, combinations, sweep_tiles
 from mlrt_compare.paper.ways import PAPER, TIMED, WITHOUT
 
-OFFICE = repository.ROOT / "scenes" / "office" / "office.xml"
 SIDE = 64
-
-
-@pytest.fixture(scope="module")
-def office() -> BenchScene:
-    return imported("office", OFFICE)
 
 
 @pytest.fixture(scope="module")
