@@ -205,6 +205,14 @@ bool any_lane(const Mask &mask) {
 template <typename Mask>
 LaneBits to_bits(const Mask &mask) {
     if constexpr (requires { mask.k; }) {
+#if defined(__AVX512F__)
+        // GCC 12 reads back four bytes of a mask of one byte that it has put aside.
+        if constexpr (sizeof(mask.k) == 1) {
+            LaneBits bits;
+            asm("kmovb %1, %0" : "=r"(bits) : "k"(mask.k));
+            return bits;
+        }
+#endif
         return LaneBits(mask.k);
     } else if constexpr (requires { mask.bitmask_(); }) {
         return LaneBits(mask.bitmask_());

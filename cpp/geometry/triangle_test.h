@@ -52,29 +52,30 @@ Vec3<Real> cross_magnitude(const Vec3<Real> &a, const Vec3<Real> &b) {
             absolute(a.x) * absolute(b.y) + absolute(a.y) * absolute(b.x)};
 }
 
-// The plane of a triangle, n.(x - a) = 0, and the magnitude that bounds the error of n.
-struct TrianglePlane {
-    Vec3d normal;    // (b - a) x (c - a), not normalised
-    Vec3d magnitude; // |b - a| x |c - a| with absolute components
+// The plane of a triangle, n.(x - a) = 0, and the magnitude that bounds the error of n: of
+// one, or of several side by side.
+template <typename Real>
+struct PlaneOf {
+    Vec3<Real> normal;    // (b - a) x (c - a), not normalised
+    Vec3<Real> magnitude; // |b - a| x |c - a| with absolute components
 
-    explicit TrianglePlane(const Triangle &triangle) {
-        const Vec3d a(triangle.a);
-        const Vec3d ab = Vec3d(triangle.b) - a;
-        const Vec3d ac = Vec3d(triangle.c) - a;
-        normal = cross(ab, ac);
-        magnitude = cross_magnitude(ab, ac);
-    }
+    explicit PlaneOf(const Triangle &triangle)
+        : PlaneOf(Vec3d(triangle.a), Vec3d(triangle.b), Vec3d(triangle.c)) {}
+    PlaneOf(const Vec3<Real> &a, const Vec3<Real> &b, const Vec3<Real> &c)
+        : normal(cross(b - a, c - a)), magnitude(cross_magnitude(b - a, c - a)) {}
 
     // n.d, and what bounds its error once it is multiplied by the greatest absolute
     // component of the direction.
-    template <typename Real>
-    Real denominator(const Vec3<Real> &direction) const {
+    template <typename Direction>
+    Direction denominator(const Vec3<Direction> &direction) const {
         return (normal.x * direction.x + normal.y * direction.y) + normal.z * direction.z;
     }
-    double denominator_error() const {
+    Real denominator_error() const {
         return (10 * DOUBLE_ROUNDOFF) * ((magnitude.x + magnitude.y) + magnitude.z);
     }
 };
+
+using TrianglePlane = PlaneOf<double>;
 
 // Numerator n.(a - o) of the distance, with a bound on its error.
 template <typename Real>
@@ -82,7 +83,8 @@ struct PlaneNumerator {
     Real value;
     Real error;
 
-    PlaneNumerator(const TrianglePlane &plane, const Vec3<Real> &to_vertex) {
+    template <typename Plane>
+    PlaneNumerator(const Plane &plane, const Vec3<Real> &to_vertex) {
         value = (plane.normal.x * to_vertex.x + plane.normal.y * to_vertex.y) +
                 plane.normal.z * to_vertex.z;
         // Eight roundings in a row lead to the value (gamma_8); 10 covers those of the
@@ -118,8 +120,8 @@ struct PlaneDistance {
                        error, Real(std::numeric_limits<double>::infinity()));
     }
 
-    template <typename Numerator>
-    PlaneDistance(const TrianglePlane &plane, const PlaneNumerator<Numerator> &numerator,
+    template <typename Plane, typename Numerator>
+    PlaneDistance(const Plane &plane, const PlaneNumerator<Numerator> &numerator,
                   const Vec3<Real> &direction, const Real &max_direction)
         : PlaneDistance(Real(numerator.value), Real(numerator.error),
                         plane.denominator(direction),

@@ -1,6 +1,7 @@
 // Takes rays of a group through the wide tree, one at a time.
 #pragma once
 
+#include "geometry/packet_distances.h"
 #include "mlrta/last_occluder.h"
 #include "mlrta/ray_cost.h"
 #include "mlrta/trace.h"
@@ -8,6 +9,7 @@
 #include "traverse/load_packet.h"
 #include "traverse/single.h"
 #include "traverse/wide.h"
+#include "traverse/wide_packets.h"
 
 #include <algorithm>
 #include <array>
@@ -52,6 +54,19 @@ public:
         for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
         if (active != 0)
             active &= ~occluder_.stop(tree_, packet, active, first, output_, counters_);
+        if constexpr (std::is_same_v<Origin, CommonOrigin>) {
+            if (std::popcount(active) >= LEAST) {
+                WidePacket &own = packets_[packet_count_];
+                own.rays = packet;
+                own.first = first;
+                own.rays.active = own.choose_axis(active);
+                if (std::popcount(own.rays.active) >= LEAST) {
+                    active &= ~own.rays.active;
+                    if (++packet_count_ == packets_.size())
+                        flush_packets();
+                }
+            }
+        }
         if (active == 0)
             return;
         if (!waiting_.has_room())
@@ -59,7 +74,22 @@ public:
         waiting_.add(packet, active, first);
     }
 
+    void flush_packets() {
+        std::array<WideHits, MOST_PACKETS> hits;
+        trace_wide_packets(wide_, tree_.triangles.data(), {packets_.data(), packet_count_}, Output::query,
+                           hits.data(), counters_);
+        for (uint32_t i = 0; i < packet_count_; ++i) {
+            const WidePacket &packet = packets_[i];
+            set(packet, hits[i]);
+            if (hits[i].found != 0)
+                occluder_.remember(hits[i].primitive.entry(
+                    uint32_t(std::countr_zero(hits[i].found))));
+        }
+        packet_count_ = 0;
+    }
     void flush() {
+        if (packet_count_ > 0)
+            flush_packets();
         if (waiting_.count == 0)
             return;
         std::array<Hit, WideRays::MOST> hits;
@@ -78,6 +108,20 @@ public:
     }
 
 private:
+    void set(const WidePacket &packet, const WideHits &hits) {
+        if constexpr (Output::query == Query::any) {
+            output_.set(packet.first, hits.found);
+        } else if (output_.wants_distances()) {
+            if (hits.found == 0)
+                return;
+            const FloatPacket t = hit_distances(packet.rays, hits.found, hits.primitive,
+                                                tree_.triangles.data(), counters_);
+            output_.set(packet.first, hits.found, t, hits.primitive);
+        } else {
+            output_.set(packet.first, hits.found, hits.primitive);
+        }
+    }
+
     // By X1.
     void trace_extreme(uint32_t i) {
         RayCost cost(rays_, counters_);
@@ -93,6 +137,10 @@ private:
     Counters &counters_;
     WideRays waiting_;
     LastOccluder<Output> occluder_;
+    static constexpr int LEAST = 4;
+    static constexpr uint32_t MOST_PACKETS = 64;
+    std::array<WidePacket, MOST_PACKETS> packets_;
+    uint32_t packet_count_ = 0;
 };
 
 } // namespace mlrt
