@@ -3,10 +3,13 @@
 #include "bind/bind.h"
 #include "bind/build_options.h"
 #include "bind/triangle_arrays.h"
+#include "geometry/block_forms.h"
 #include "geometry/sheared_volumes.h"
 #include "kdtree/builder.h"
 #include "kdtree/wide_maker.h"
 #include "traverse/load_packet.h"
+#include "traverse/packet_frustum.h"
+#include "traverse/wide_packets.h"
 #include "traverse/wide_rays.h"
 
 #include <cstring>
@@ -22,6 +25,7 @@ namespace mlrt {
 namespace {
 
 using Point = std::array<float, 3>;
+using Eight = std::array<float, BLOCK_WIDTH>;
 
 // The words that each of them consists of.
 template <typename T>
@@ -51,11 +55,21 @@ bool is_made(const TriangleArray &array, bool cancelled, const nb::kwargs &optio
     return make_wide_tree(built.tree, [&] { return cancelled; }).has_value();
 }
 
+using BlockCoordinates = std::array<std::array<float, BLOCK_WIDTH>, 9>;
+
+BlockCoordinates coordinates_of(const TriangleArray &eight) {
+    if (eight.shape(0) != BLOCK_WIDTH)
+        throw nb::value_error("eight triangles");
+    BlockCoordinates coordinates;
+    for (size_t i = 0; i < BLOCK_WIDTH; ++i)
+        for (size_t k = 0; k < 9; ++k)
+            coordinates[k][i] = eight(i, k / 3, k % 3);
+    return coordinates;
+}
+
 // One bit a triangle: those that the ray certainly hits, and certainly misses.
 std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &direction,
                                       const TriangleArray &eight) {
-    if (eight.shape(0) != BLOCK_WIDTH)
-        throw nb::value_error("eight triangles");
     const float zero = 0, one = 1;
     RayGroup group;
     group.count = 1;
@@ -70,14 +84,39 @@ std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &directio
         throw nb::value_error("a moderate direction");
     WideRays rays;
     rays.add(packet, 1, 0);
-    std::array<std::array<float, BLOCK_WIDTH>, 9> coordinates;
-    for (size_t i = 0; i < BLOCK_WIDTH; ++i)
-        for (size_t k = 0; k < 9; ++k)
-            coordinates[k][i] = eight(i, k / 3, k % 3);
     const ShearedRay sheared({origin[0], origin[1], origin[2]}, rays.main_axis[0],
                              rays.shear_x[0], rays.shear_y[0]);
-    const ShearedVolumes<FloatBlock> volumes(sheared, coordinates);
+    const ShearedVolumes<FloatBlock> volumes(sheared, coordinates_of(eight));
     return {volumes.certain_hits(), volumes.certain_misses()};
+}
+
+// What block forms tell of the ray: bits of possible and certain hits, bounds of the depths
+// of the former, and the axis that these are measured along.
+nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray &eight) {
+    const float zero = 0, one = 1;
+    RayGroup group;
+    group.count = 1;
+    group.has_common_origin = true;
+    group.common_origin = {origin[0], origin[1], origin[2]};
+    for (int k = 0; k < 3; ++k)
+        group.direction[k] = &direction[size_t(k)];
+    group.t_min = &zero;
+    group.t_max = &one;
+    WidePacket packet{load_packet<CommonOrigin>(group, 0).rays, 0, 0, 1};
+    if (packet.rays.active != 1)
+        throw nb::value_error("a moderate direction");
+    packet.choose_axis(1);
+    const PacketFrustum frustum(packet.rays, packet.main_axis, packet.side);
+    const BlockForms forms(coordinates_of(eight), frustum.axes, frustum.origin,
+                           frustum.greatest_sum);
+    const BlockForms::Seen seen =
+        forms.seen_by(frustum.slopes[0].entry(0), frustum.slopes[1].entry(0), frustum.side);
+    Eight nearest{}, farthest{};
+    if (seen.possible != 0) {
+        store(nearest.data(), seen.nearest);
+        store(farthest.data(), seen.farthest);
+    }
+    return nb::make_tuple(seen.possible, seen.certain, nearest, farthest, packet.main_axis);
 }
 
 } // namespace
@@ -90,6 +129,7 @@ void bind_wide_selftest(nb::module_ &m) {
     s.def("is_made", &is_made, nb::arg("triangles"), nb::arg("cancelled"),
           nb::arg("options"));
     s.def("decided", &decided);
+    s.def("seen", &seen);
     s.attr("max_wide_depth") = MAX_WIDE_DEPTH;
 }
 

@@ -31,7 +31,8 @@ public:
     // nine, of 2 s e each, for three terms, which are at most `slopes`: 18 u s e times
     // that; 20 covers products of roundings and the bound itself. N has the same roundings
     // with e for s. N.a has eight: four of N, one of a, three of its own, of three terms of
-    // at most 2 e^2 s: 48 u e^2 s; 52 covers the rest.
+    // at most 2 e^2 s: 48 u e^2 s; 52 covers the rest. What underflow takes from N it takes
+    // s times from N.a.
     BlockForms(const std::array<std::array<float, BLOCK_WIDTH>, 9> &coordinates,
                const std::array<int, 3> &axes, const std::array<Real, 3> &origin,
                float slopes) {
@@ -62,12 +63,13 @@ public:
         };
         const Real size = largest(a, b, c), edge = largest(ab, bc, ca);
         const auto moderate = (size < LARGEST_SIZE) & (edge < LARGEST_SIZE);
-        edge_error_ = select(moderate,
-                             (20 * FLOAT_ROUNDOFF * slopes) * (size * edge) + UNDERFLOW,
-                             Real(INFINITY));
+        edge_error_ =
+            select(moderate, (20 * FLOAT_ROUNDOFF * slopes) * (size * edge) + UNDERFLOW,
+                   Real(INFINITY));
         const Real square = edge * edge;
         normal_error_ = (20 * FLOAT_ROUNDOFF * slopes) * square + UNDERFLOW;
-        const Real error = (52 * FLOAT_ROUNDOFF) * (square * size) + UNDERFLOW;
+        const Real error =
+            (52 * FLOAT_ROUNDOFF) * (square * size) + UNDERFLOW * (size + 1.0f);
         // Nothing is known of the depth if it is more than a quarter, or not a number.
         numerator_share_ = error / absolute(numerator_);
     }
@@ -91,7 +93,7 @@ public:
         };
         const Real u = form(edges_[0]), v = form(edges_[1]), w = form(edges_[2]);
         const Real least = minimum(u, minimum(v, w)), greatest = maximum(u, maximum(v, w));
-        Seen seen;
+        Seen seen{};
         seen.possible = ~to_bits((least < -edge_error_) & (greatest > edge_error_)) &
                         ((1u << BLOCK_WIDTH) - 1);
         if (seen.possible == 0)
@@ -100,8 +102,7 @@ public:
         const Real reciprocal = 1.0f / form(normal_);
         const Real depth = numerator_ * side * reciprocal;
         const Real own_share = normal_error_ * absolute(reciprocal);
-        const Real share =
-            1.5f * (numerator_share_ + own_share) + WIDEN_DEPTH;
+        const Real share = 1.5f * (numerator_share_ + own_share) + WIDEN_DEPTH;
         const auto known = (numerator_share_ <= 0.25f) & (own_share <= 0.25f);
         const Real slack = absolute(depth) * share;
         seen.nearest = select(known, depth - slack, Real(-INFINITY));

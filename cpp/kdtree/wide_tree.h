@@ -33,6 +33,9 @@ public:
 
     uint32_t bits() const { return bits_; }
     static WideChild from_bits(uint32_t bits) { return WideChild(bits); }
+    static MaskOf<UIntBlock> are_blocks(const UIntBlock &bits) {
+        return (bits & UIntBlock(BLOCK)) != UIntBlock(0u);
+    }
 
 private:
     static constexpr uint32_t BLOCK = 1u << 31;
@@ -52,6 +55,10 @@ struct alignas(CACHE_LINE) WideNode {
     // Numbers of all children from back to front, by octant of the direction (bit k:
     // towards lower x[k]): four bits each, the last one highest.
     std::array<uint32_t, 8> back_to_front;
+
+    MaskOf<UIntBlock> are_blocks() const {
+        return WideChild::are_blocks(load<UIntBlock>(children.data()));
+    }
 };
 
 static_assert(sizeof(WideNode) == 4 * CACHE_LINE);

@@ -6,6 +6,7 @@
 #include "base/exactness.h"
 #include "mlrta/beam_leaf.h"
 #include "mlrta/packet_tracer.h"
+#include "mlrta/patience.h"
 
 #include <bit>
 #include <optional>
@@ -28,7 +29,7 @@ public:
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
           packets_(tree, rays, options, output, counters), beam_(memory.beam),
-          regroupings_(regroupings) {}
+          regroupings_(regroupings), patience_(patience_of_thread<BeamTracer>(&tree)) {}
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
@@ -38,6 +39,12 @@ public:
                 camera_ || (i % LARGE_BEAM == 0 &&
                             memory_.triangles_per_ray <= LARGE_TRIANGLES_PER_RAY);
             const uint32_t rays = std::min(count - i, large ? LARGE_BEAM : SMALL_BEAM);
+            if (packets_.knows_wide_tree() && patience_.spares_next()) {
+                ++counters_.fallbacks;
+                trace_apart(first + i, rays, frontier);
+                i += rays;
+                continue;
+            }
             trace_beam(first + i, rays, frontier, camera_ != nullptr);
             i += rays;
         }
@@ -81,15 +88,6 @@ private:
                 return;
         }
 
-        if (packets_.knows_wide_tree() && memory_.triangles_per_ray > DENSE) {
-            memory_.triangles_per_ray *= FORGETTING;
-            for (uint32_t n = 0; n < beam.count; ++n)
-                packets_.trace_stray(beam.packets[n].first_ray,
-                                     beam.packets[n].active | beam.packets[n].strays,
-                                     frontier);
-            packets_.flush();
-            return;
-        }
         uint32_t active = 0;
         for (uint32_t n = 0; n < beam.count; ++n)
             active += uint32_t(std::popcount(beam.packets[n].active));
@@ -97,13 +95,15 @@ private:
         counters_.packets += beam.count;
         ++counters_.beams;
         const uint32_t most = options_.traversal == Traversal::adaptive
-                                  ? FREE_TRIANGLES + MOST_TRIANGLES_PER_RAY * active
+                                  ? FREE_TRIANGLES + most_triangles_per_ray() * active
                                   : std::numeric_limits<uint32_t>::max();
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
         const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
                                                          most, beam, counters_);
         const float spent = float(counters_.beam_triangles - before) / float(active);
+        if (packets_.knows_wide_tree())
+            judge(done, spent);
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)
@@ -113,6 +113,21 @@ private:
             finish(beam.packets[n], done, frontier);
         if (beam.any_stray)
             trace_strays(frontier);
+        packets_.flush();
+    }
+
+    // Whether beams pay, by the triangles that one spent on each of its rays.
+    void judge(bool done, float spent) {
+        if (!done || spent > DENSE)
+            patience_.lose();
+        else if (spent > 0 && spent < SPARSE)
+            patience_.win();
+    }
+
+    // Traces a run of rays as packets, or one by one.
+    void trace_apart(uint32_t first, uint32_t count, const Frontier &frontier) {
+        for (uint32_t i = 0; i < count; i += PACKET_WIDTH)
+            packets_.trace_stray(first + i, first_lanes(count - i), frontier);
         packets_.flush();
     }
 
@@ -235,10 +250,16 @@ private:
     static constexpr uint32_t MOST_TRIANGLES_PER_RAY =
         Output::query == Query::any ? 24 : 96;
 
-    // Where beams met more triangles a ray than that, the next one's rays take the wide
-    // tree at once, until that is forgotten. Chosen from 1.5 to 5 by the frames of
-    // conference, sponza and dragon.
-    static constexpr float DENSE = 5, FORGETTING = 0.9f;
+    // The same where there is the wide tree, which takes less time then. Beams that meet
+    // more than DENSE triangles a ray had better not be tried, those that meet less than
+    // SPARSE had. Chosen from 2 to 12, from 2 to 4 and from 0.5 to 2 by the frames of
+    // conference, sponza, building and dragon.
+    static constexpr uint32_t MOST_BESIDE_WIDE_TREE = 4;
+    static constexpr float DENSE = 3, SPARSE = 1;
+
+    uint32_t most_triangles_per_ray() const {
+        return packets_.knows_wide_tree() ? MOST_BESIDE_WIDE_TREE : MOST_TRIANGLES_PER_RAY;
+    }
 
     const KdTree &tree_;
     const RayGroup &rays_;
@@ -250,6 +271,7 @@ private:
     PacketTracer<Origin, Output> packets_;
     BeamPackets &beam_;    // kept by the memory, since regrouped rays need it no more
     uint32_t regroupings_; // that these rays come from
+    Patience &patience_;
 };
 
 } // namespace mlrt

@@ -1,4 +1,5 @@
-// Takes rays of a group through the wide tree, one at a time.
+// Takes rays of a group through the wide tree: as packets those that have a common origin
+// and go along with each other, one at a time the others.
 #pragma once
 
 #include "geometry/packet_distances.h"
@@ -14,6 +15,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <memory>
+#include <type_traits>
 
 namespace mlrt {
 
@@ -54,19 +57,8 @@ public:
         for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
         if (active != 0)
             active &= ~occluder_.stop(tree_, packet, active, first, output_, counters_);
-        if constexpr (std::is_same_v<Origin, CommonOrigin>) {
-            if (std::popcount(active) >= LEAST) {
-                WidePacket &own = packets_[packet_count_];
-                own.rays = packet;
-                own.first = first;
-                own.rays.active = own.choose_axis(active);
-                if (std::popcount(own.rays.active) >= LEAST) {
-                    active &= ~own.rays.active;
-                    if (++packet_count_ == packets_.size())
-                        flush_packets();
-                }
-            }
-        }
+        if constexpr (std::is_same_v<Origin, CommonOrigin>)
+            active &= ~add_packet(packet, active, first);
         if (active == 0)
             return;
         if (!waiting_.has_room())
@@ -74,22 +66,8 @@ public:
         waiting_.add(packet, active, first);
     }
 
-    void flush_packets() {
-        std::array<WideHits, MOST_PACKETS> hits;
-        trace_wide_packets(wide_, tree_.triangles.data(), {packets_.data(), packet_count_}, Output::query,
-                           hits.data(), counters_);
-        for (uint32_t i = 0; i < packet_count_; ++i) {
-            const WidePacket &packet = packets_[i];
-            set(packet, hits[i]);
-            if (hits[i].found != 0)
-                occluder_.remember(hits[i].primitive.entry(
-                    uint32_t(std::countr_zero(hits[i].found))));
-        }
-        packet_count_ = 0;
-    }
     void flush() {
-        if (packet_count_ > 0)
-            flush_packets();
+        flush_packets();
         if (waiting_.count == 0)
             return;
         std::array<Hit, WideRays::MOST> hits;
@@ -108,18 +86,61 @@ public:
     }
 
 private:
-    void set(const WidePacket &packet, const WideHits &hits) {
-        if constexpr (Output::query == Query::any) {
-            output_.set(packet.first, hits.found);
-        } else if (output_.wants_distances()) {
-            if (hits.found == 0)
-                return;
-            const FloatPacket t = hit_distances(packet.rays, hits.found, hits.primitive,
-                                                tree_.triangles.data(), counters_);
-            output_.set(packet.first, hits.found, t, hits.primitive);
-        } else {
-            output_.set(packet.first, hits.found, hits.primitive);
+    // Packets of fewer rays are not worth it; chosen.
+    static constexpr int LEAST_OF_PACKET = 4;
+    static constexpr uint32_t MOST_PACKETS = 64;
+
+    // Puts those of the given lanes off that go along with each other, as a packet, unless
+    // they are few. Returns them.
+    LaneBits add_packet(const RayPacket<CommonOrigin> &rays, LaneBits lanes,
+                        uint32_t first) {
+        if (std::popcount(lanes) < LEAST_OF_PACKET)
+            return 0;
+        // Few of the tracers that are made meet such rays.
+        if (!packets_)
+            packets_ = std::make_unique<std::array<WidePacket, MOST_PACKETS>>();
+        WidePacket &packet = (*packets_)[packet_count_];
+        packet.rays = rays;
+        packet.first = first;
+        const LaneBits along = packet.choose_axis(lanes);
+        if (std::popcount(along) < LEAST_OF_PACKET)
+            return 0;
+        packet.rays.active = along;
+        // What the rays take is shared by those of a packet.
+        if (++packet_count_ == MOST_PACKETS || rays_.cost)
+            flush_packets();
+        return along;
+    }
+
+    void flush_packets() {
+        if (packet_count_ == 0)
+            return;
+        std::array<WideHits, MOST_PACKETS> hits;
+        RayCost cost(rays_, counters_);
+        trace_wide_packets(wide_, tree_.triangles.data(), {packets_->data(), packet_count_},
+                           Output::query, hits.data(), counters_);
+        for (uint32_t i = 0; i < packet_count_; ++i) {
+            const WidePacket &packet = (*packets_)[i];
+            cost.add_to_lanes(packet.first, packet.rays.active);
+            if (hits[i].found == 0)
+                continue;
+            set(packet, hits[i]);
+            occluder_.remember(
+                lane_of(hits[i].primitive, uint32_t(std::countr_zero(hits[i].found))));
         }
+        packet_count_ = 0;
+    }
+
+    void set(const WidePacket &packet, const WideHits &hits) {
+        if constexpr (Output::query == Query::any)
+            output_.set(packet.first, hits.found);
+        else if (output_.wants_distances())
+            output_.set(packet.first, hits.found,
+                        hit_distances(packet.rays, hits.found, hits.primitive,
+                                      tree_.triangles.data(), counters_),
+                        hits.primitive);
+        else
+            output_.set(packet.first, hits.found, hits.primitive);
     }
 
     // By X1.
@@ -137,9 +158,7 @@ private:
     Counters &counters_;
     WideRays waiting_;
     LastOccluder<Output> occluder_;
-    static constexpr int LEAST = 4;
-    static constexpr uint32_t MOST_PACKETS = 64;
-    std::array<WidePacket, MOST_PACKETS> packets_;
+    std::unique_ptr<std::array<WidePacket, MOST_PACKETS>> packets_;
     uint32_t packet_count_ = 0;
 };
 

@@ -1,5 +1,8 @@
 // Packets of rays with a common origin through the wide tree: for dense scans, where
 // neighbouring rays enter the same nodes but hit different triangles.
+//
+// A packet visits a node once for all of its rays, as long as more than a few enter it, and
+// tests a block ray by ray, eight triangles at a time.
 #pragma once
 
 #include "base/counters.h"
@@ -13,27 +16,29 @@
 
 namespace mlrt {
 
-// Sixteen rays of a group, from `first` on, of which the active ones are traced: all of
-// them go along one axis.
+// Sixteen rays of a group, from `first` on, of which the active ones are traced.
 struct WidePacket {
     RayPacket<CommonOrigin> rays;
-    uint32_t first = 0;
-    uint32_t main_axis = 0;
-    float side = 1; // of the main axis, that all rays go to
+    uint32_t first;
+    int main_axis; // along which all of them move most
+    float side;    // the sign of their directions there
 
-    // Lanes of a packet that go along the axis of the one in the middle of them.
+    // Takes the axis along which the ray in the middle of the given ones moves most, one at
+    // least, and returns those of them that go along with it.
     LaneBits choose_axis(LaneBits lanes);
 };
 
-// The nearest triangles, or any, of the lanes that found one.
+// The nearest triangles of those lanes that found one, or any.
 struct WideHits {
     UIntPacket primitive;
     LaneBits found;
 };
 
-// Packets take turns, as a step mostly waits for memory; `hits` has room for one each.
-// Those of triangle_test.h, as by every other traversal.
+// Packets take turns, as a step mostly waits for memory; `hits` has room for one each, in
+// their order. Those of triangle_test.h, as by every other traversal. Triangles are those
+// that the tree has copies of.
 void trace_wide_packets(const WideTree &tree, const Triangle *triangles,
-                        std::span<const WidePacket> packets, Query query, WideHits *hits, Counters &counters);
+                        std::span<const WidePacket> packets, Query query, WideHits *hits,
+                        Counters &counters);
 
 } // namespace mlrt

@@ -1,0 +1,47 @@
+// Whether beams pay where a thread traces, or rays had better go another way at once.
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+namespace mlrt {
+// A beam takes long until it is known that it meets a dense surface. Surfaces go on: after
+// such a beam the next one is not tried, after another one the next three, and so on, until
+// one pays.
+class Patience {
+public:
+    // Whether the next beam should not be tried.
+    bool spares_next() {
+        if (left_ == 0)
+            return false;
+        --left_;
+        return true;
+    }
+
+    // What came of one that was tried.
+    void lose() { left_ = spared_ = std::min(2 * spared_ + 1, MOST_SPARED); }
+    void win() { spared_ = 0; }
+
+private:
+    // Chosen; half of it takes up to 4 % longer in dragon.
+    static constexpr uint32_t MOST_SPARED = 32;
+
+    uint32_t spared_ = 0; // beams after the last one that was lost
+    uint32_t left_ = 0;   // of these
+};
+
+// That of this thread, for one kind of beams in one scene: neighbouring tiles are mostly
+// traced by the same thread.
+template <typename Kind>
+Patience &patience_of_thread(const void *scene) {
+    struct Known {
+        const void *scene = nullptr;
+        Patience patience;
+    };
+    thread_local Known known;
+    if (known.scene != scene)
+        known = {scene, {}};
+    return known.patience;
+}
+
+} // namespace mlrt

@@ -1,0 +1,149 @@
+"""Packets with a common origin through the wide tree find what brute force does."""
+
+from __future__ import annotations
+
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import workloads
+from tracing import BRUTE_FORCE, Options, build, closest, each_core, interval, occluded
+from workloads import Rays, Scene
+
+SEED = 20261130
+SCENES = sorted(workloads.scenes(np.random.default_rng(SEED)))
+
+WIDE: Options = {"traversal": "wide", "entry_points": False}
+ADAPTIVE: Options = {"traversal": "adaptive"}
+
+
+def in_order(directions: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Directions such that neighbours mostly are close to each other."""
+    size = np.abs(directions).max(axis=1, keepdims=True)
+    cells = np.floor(8 * directions / np.where(size > 0, size, 1))
+    return np.ascontiguousarray(directions[np.lexsort(cells.T)])
+
+
+def rays_from(
+    rng: np.random.Generator, scene: Scene, origin: npt.NDArray[np.float32], count: int
+) -> Rays:
+    """At vertices, edges and points nearby, along axes, and strays."""
+    vertices, faces = scene
+    face = rng.choice(faces, count)
+    weights = rng.choice([0, 0, 0.5, 0.25, 1], (count, 3))
+    weights[weights.sum(axis=1) == 0] = (0, 1, 0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    targets = (vertices[face].astype(np.float64) * weights[:, :, None]).sum(axis=1)
+    directions = (targets.astype(np.float32) - origin).astype(np.float32)
+    directions[rng.random((count, 3)) < 0.03] = 0
+    directions[rng.random((count, 3)) < 0.01] = np.float32(-0.0)
+    directions = in_order(directions)
+    directions[::53] *= np.float32(2.0**-70)
+    directions[7::59] = 0
+    directions[11::61] = -directions[11::61]
+    return np.tile(origin, (count, 1)), directions
+
+
+def assert_brute_force(
+    rng: np.random.Generator, core: ModuleType, scene: Scene, count: int
+) -> int:
+    """Returns how many rays hit something."""
+    tree = build(core, scene)
+    tree.widen()
+    vertices = scene[0]
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    outside = (high + (high - low) * np.float32([0.3, 0.8, 1.5])).astype(np.float32)
+    on_plane = vertices[0].copy()
+    on_plane[0] = outside[0]
+    found = 0
+    for origin in (outside, on_plane, vertices[-1], ((low + high) / 2).astype(np.float32)):
+        rays = rays_from(rng, scene, origin, count)
+        first = closest(tree, rays, BRUTE_FORCE)
+        t = np.where(first.face < 0, np.float32(1), first.t)
+        below = np.nextafter(t, np.float32(0))
+        for t_min, t_max in ((0, np.inf), (0, t), (0, below), (t, np.inf), (below, t)):
+            expected = closest(tree, rays, BRUTE_FORCE, t_min, t_max)
+            for options in (WIDE, ADAPTIVE):
+                closest(tree, rays, options, t_min, t_max).assert_same(expected)
+                hit = occluded(tree, rays, options, t_min, t_max)
+                np.testing.assert_array_equal(hit, expected.face >= 0)
+            found += int((expected.face >= 0).sum())
+    return found
+
+
+@each_core
+@pytest.mark.parametrize("name", SCENES)
+def test_same_hits_as_brute_force(core: ModuleType, name: str) -> None:
+    rng = np.random.default_rng(SEED)
+    scene = workloads.scenes(rng)[name]
+    assert assert_brute_force(rng, core, scene, 500) > 100, SEED
+
+
+@each_core
+@pytest.mark.parametrize("power", [-120, -70, -40, 30, 60, 100])
+def test_same_hits_in_huge_and_tiny_scenes(core: ModuleType, power: int) -> None:
+    rng = np.random.default_rng(SEED)
+    vertices, faces = workloads.soup(rng, 200, 0.4)
+    scene = (vertices * np.float32(2.0**power)).astype(np.float32), faces
+    assert assert_brute_force(rng, core, scene, 300) > 100, SEED
+
+
+def dense(rng: np.random.Generator) -> tuple[Scene, Rays]:
+    """A wavy surface of 20000 triangles and a square of 64 x 64 rays from one point, in
+    Morton order."""
+    side = 101
+    y, x = np.mgrid[0:side, 0:side] / (side - 1) - 0.5
+    z = 4 + 0.02 * np.sin(40 * x) * np.cos(35 * y)
+    vertices = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    vertices += rng.uniform(-1e-3, 1e-3, vertices.shape)
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    lower = np.stack([corner, corner + 1, corner + side], axis=1)
+    upper = np.stack([corner + 1, corner + side + 1, corner + side], axis=1)
+    faces = np.concatenate([lower, upper]).astype(np.uint32)
+    bits = np.arange(4096)
+    column = sum((bits >> 2 * k & 1) << k for k in range(6))
+    row = sum((bits >> 2 * k + 1 & 1) << k for k in range(6))
+    directions = np.ones((4096, 3), np.float32)
+    directions[:, 0] = (column - 31.7) / 64 * 0.2
+    directions[:, 1] = (row - 31.3) / 64 * 0.2
+    return (vertices.astype(np.float32), faces), (np.zeros_like(directions), directions)
+
+
+@each_core
+def test_neighbours_share_steps(core: ModuleType) -> None:
+    """Rays that have their own origins go alone: those visit more nodes by far."""
+    scene, rays = dense(np.random.default_rng(SEED))
+    tree = build(core, scene)
+    tree.widen()
+    expected = closest(tree, rays, BRUTE_FORCE)
+    assert (expected.face >= 0).all()
+    closest(tree, rays, WIDE).assert_same(expected)
+
+    def counted(some: Rays) -> dict[str, int]:
+        counters: dict[str, int] = {}
+        tree.closest_hit(*some, *interval(some, 0, np.inf), WIDE, counters)
+        assert counters["rays"] == 4096
+        return counters
+
+    alone = rays[0].copy()
+    alone[:, 2] = np.linspace(0, 1e-6, 4096)
+    together, apart = counted(rays), counted((alone, rays[1]))
+    assert 0 < 3 * together["traversal_steps"] < apart["traversal_steps"]
+    # A ray tests about the same triangles either way.
+    assert 0 < together["triangle_tests"] < 1.5 * apart["triangle_tests"]
+
+
+@each_core
+def test_beams_are_not_tried_again_and_again_where_they_lose(core: ModuleType) -> None:
+    """The first one of a dense surface is given up; most of the others are not tried."""
+    scene, rays = dense(np.random.default_rng(SEED))
+    tree = build(core, scene)
+    tree.widen()
+    expected = closest(tree, rays, BRUTE_FORCE)
+    counters: dict[str, int] = {}
+    tree.closest_hit(*rays, *interval(rays, 0, np.inf), ADAPTIVE, counters)
+    closest(tree, rays, ADAPTIVE).assert_same(expected)
+    np.testing.assert_array_equal(occluded(tree, rays, ADAPTIVE), expected.face >= 0)
+    assert counters["rays"] == 4096
+    assert 0 < counters["beams"] < counters["fallbacks"]
