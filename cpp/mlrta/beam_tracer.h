@@ -23,7 +23,7 @@ public:
 
     // `camera` has made the rays, if it is given.
     BeamTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-               const CameraMap *camera, Output output, Counters &counters,
+               const CameraRays *camera, Output output, Counters &counters,
                BeamMemory &memory, uint32_t regroupings = 0)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
@@ -58,8 +58,8 @@ private:
         BeamPackets &beam = beam_;
         if constexpr (PARALLEL)
             beam.load_parallel(rays_, first, count, tree_.bounds);
-        else
-            beam.load(rays_, first, count, camera_);
+        else if (!camera_ || !beam.load_camera(rays_, first, count, *camera_))
+            beam.load(rays_, first, count, camera_ ? &camera_->tile.camera : nullptr);
         if (!beam.any_active) {
             if (PARALLEL && beam.any_stray) // too little is certain of all of them
                 packets_.trace(first, count, frontier);
@@ -110,18 +110,30 @@ private:
                 cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
         counters_.fallbacks += !done;
         for (uint32_t n = 0; n < beam.count; ++n)
-            finish(beam.packets[n], done, frontier);
+            finish(n, done, frontier);
         if (beam.any_stray)
             trace_strays(frontier);
         packets_.flush();
     }
 
     // Writes what a packet has found, or leaves the rest of it to others.
-    void finish(const BeamPacket &packet, bool done, const Frontier &frontier) {
+    void finish(uint32_t number, bool done, const Frontier &frontier) {
+        if (!EXACT && beam_.is_covered(number))
+            beam_.settle(rays_, number);
+        const BeamPacket &packet = beam_.packets[number];
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
             output_.set(packet.first_ray, packet.found);
             left &= ~packet.found;
+        } else if (done && beam_.is_covered(number)) {
+            const UIntPacket primitive(beam_.covers[number].primitive);
+            if (output_.wants_distances())
+                output_.set(packet.first_ray, packet.active,
+                            memory_.distances.of(rays_, packet.first_ray, packet.active,
+                                                 primitive, counters_),
+                            primitive);
+            else
+                output_.set(packet.first_ray, packet.active, primitive);
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
                 output_.set(packet.first_ray, packet.found, distances_of(packet),
@@ -243,7 +255,7 @@ private:
     const KdTree &tree_;
     const RayGroup &rays_;
     const TraceOptions &options_;
-    const CameraMap *camera_;
+    const CameraRays *camera_;
     Output output_;
     Counters &counters_;
     BeamMemory &memory_;

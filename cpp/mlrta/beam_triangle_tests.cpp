@@ -92,6 +92,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     triangles_left_ -= std::min(triangles_left_, tested);
     tested_ += tested;
     if (tested_ > DENSE_TRIANGLES && !dense_) {
+        beam_.load_slopes(rays_);
         grid_.fill(beam_);
         dense_ = true;
     }
@@ -101,11 +102,22 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
+    bool any_covered = false;
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const BeamPackets::Run &run = beam_.runs[n];
         const LaneBits triangles = one_run ? possible : possible & forms.possible_for(run);
         for_each_lane(triangles, [&](uint32_t lane) {
-            const LaneBits packets = forms.packets_for(lane, run);
+            LaneBits packets;
+            if constexpr (query == Query::any) {
+                packets = forms.packets_for(lane, run);
+            } else {
+                const auto coverage = forms.coverage_of(lane, beam_, run);
+                packets = coverage.possible & ~coverage.covered;
+                if (coverage.covered != 0) {
+                    cover(n, coverage, forms, lane, numbers[lane]);
+                    any_covered = true;
+                }
+            }
             const uint32_t first = lane * BeamPackets::CAPACITY + n * PACKET_WIDTH;
             store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
                              packets);
@@ -118,6 +130,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
                        lane = pairs_[i] / BeamPackets::CAPACITY;
+        if (query == Query::closest && !beam_.is_settled(n))
+            beam_.settle(rays_, n);
         const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
@@ -129,7 +143,36 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         });
     if (changed != 0)
         update_least(changed);
+    else if (any_covered)
+        update_least();
     for_each_lane(forms.unsafe, [&](uint32_t lane) { test_unsafe(numbers[lane]); });
+}
+
+// Packets of a run, of which a triangle covers some.
+template <Query query>
+void BeamTriangleTests<query>::cover(uint32_t number,
+                                     const TriangleForms::Coverage &coverage,
+                                     const TriangleForms &forms, uint32_t lane,
+                                     uint32_t primitive) {
+    BeamPackets::Run &run = beam_.runs[number];
+    const auto mask = from_bits<FloatPacket>(coverage.covered);
+    const auto raise = [&](LaneArray<float> &bounds, const FloatPacket &to) {
+        store(bounds.data(), select(mask, to, load<FloatPacket>(bounds)));
+    };
+    raise(run.least, coverage.least);
+    raise(run.greatest, coverage.greatest);
+    run.all.least = least_lane(load<FloatPacket>(run.least));
+    const uint32_t first = number * PACKET_WIDTH;
+    beam_.covered |= uint64_t(coverage.covered) << first;
+    constexpr int DEPTH = TriangleForms::DEPTH;
+    const BeamPackets::Cover cover{primitive,
+                                   forms.constant[DEPTH][lane],
+                                   forms.of_u[DEPTH][lane],
+                                   forms.of_v[DEPTH][lane],
+                                   EXACT ? forms.depth_shrink[lane] : 1.0f,
+                                   EXACT ? forms.depth_grow[lane] : 1.0f,
+                                   EXACT ? forms.depth_error[lane] : 0.0f};
+    for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
 // One triangle against sixteen rays. Returns whether they found something.
@@ -275,6 +318,8 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
     for (uint32_t n = 0; n < beam_.count; ++n) {
+        if (!beam_.is_settled(n))
+            beam_.settle(rays_, n);
         BeamPacket &packet = beam_.packets[n];
         decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
     }
@@ -292,6 +337,7 @@ void BeamTriangleTests<query>::update_least(uint64_t packets) {
         BeamPackets::Run &run = beam_.runs[n];
         for_each_lane(changed, [&](uint32_t i) {
             run.least[i] = least_lane(beam_.packets[n * PACKET_WIDTH + i].least);
+            run.greatest[i] = INFINITE;
         });
         run.all.least = least_lane(load<FloatPacket>(run.least));
     }
