@@ -246,7 +246,7 @@ void BeamPackets::fit_rectangle() {
     }
 }
 
-void BeamPackets::settle(const RayGroup &rays, uint32_t number) {
+void BeamPackets::settle_packet(const RayGroup &rays, uint32_t number) {
     if (unloaded >> number & 1)
         load_camera_packet(rays, number);
     if (!is_covered(number))

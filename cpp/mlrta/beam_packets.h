@@ -20,6 +20,7 @@
 #include "traverse/ray_group.h"
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -114,11 +115,11 @@ struct BeamPackets {
     // `active`, `found` and `strays` are known.
     uint64_t unloaded;
 
-    bool is_settled(uint32_t number) const {
-        return ((covered | unloaded) >> number & 1) == 0;
+    // Makes all known of those of the given packets of which it is not.
+    void settle(const RayGroup &rays, uint64_t numbers) {
+        for (uint64_t left = numbers & (covered | unloaded); left != 0; left &= left - 1)
+            settle_packet(rays, uint32_t(std::countr_zero(left)));
     }
-    // Makes all of a packet known.
-    void settle(const RayGroup &rays, uint32_t number);
     // Makes the slopes of all packets known.
     void load_slopes(const RayGroup &rays);
 
@@ -196,6 +197,7 @@ private:
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last,
                                      BeamPacket &packet, Begin &begin,
                                      FloatPacket &reach) const;
+    void settle_packet(const RayGroup &rays, uint32_t number);
     void load_camera_packet(const RayGroup &rays, uint32_t number);
     void set_ends(BeamPacket &packet, const FloatPacket &t_max,
                   const FloatPacket &main) const;

@@ -58,7 +58,7 @@ private:
         BeamPackets &beam = beam_;
         if constexpr (PARALLEL)
             beam.load_parallel(rays_, first, count, tree_.bounds);
-        else if (!camera_ || !beam.load_camera(rays_, first, count, *camera_))
+        else if (!film_bounds_pay() || !beam.load_camera(rays_, first, count, *camera_))
             beam.load(rays_, first, count, camera_ ? &camera_->tile.camera : nullptr);
         if (!beam.any_active) {
             if (PARALLEL && beam.any_stray) // too little is certain of all of them
@@ -116,10 +116,16 @@ private:
         packets_.flush();
     }
 
+    // Whether bounds by the film are narrow, or few triangles are tested against them.
+    bool film_bounds_pay() const {
+        return camera_ && (camera_->tile.begin == camera_->tile.end ||
+                           memory_.triangles_per_ray <= LOOSE_TRIANGLES_PER_RAY);
+    }
+
     // Writes what a packet has found, or leaves the rest of it to others.
     void finish(uint32_t number, bool done, const Frontier &frontier) {
         if (!EXACT && beam_.is_covered(number))
-            beam_.settle(rays_, number);
+            beam_.settle(rays_, uint64_t(1) << number);
         const BeamPacket &packet = beam_.packets[number];
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
@@ -233,6 +239,11 @@ private:
     // no more triangles than this. Chosen from 0.05 to no limit, and beams of a camera from
     // that too, by the frames of office, conference, sponza and building.
     static constexpr float LARGE_TRIANGLES_PER_RAY = 0.1f;
+
+    // Where beams met more triangles a ray, those of a camera are bounded by their rays,
+    // and not by the film if that leaves open where in a pixel they lie. Chosen from 0.1
+    // and no limit, by frames of conference.
+    static constexpr float LOOSE_TRIANGLES_PER_RAY = 0.1f;
 
     // How often a ray is regrouped. Slopes that fall off as powers do are cut one ray at a
     // time, which would take a beam's rays squared, and as many frames of the stack as it

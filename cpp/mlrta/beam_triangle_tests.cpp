@@ -103,6 +103,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
     bool any_covered = false;
+    uint64_t in_pairs = 0; // packets
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const BeamPackets::Run &run = beam_.runs[n];
         const LaneBits triangles = one_run ? possible : possible & forms.possible_for(run);
@@ -113,6 +114,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
             } else {
                 const auto coverage = forms.coverage_of(lane, beam_, run);
                 packets = coverage.possible & ~coverage.covered;
+                in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
                 if (coverage.covered != 0) {
                     cover(n, coverage, forms, lane, numbers[lane]);
                     any_covered = true;
@@ -125,13 +127,13 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         });
     }
     counters_.triangle_tests += pairs;
+    if constexpr (query == Query::closest)
+        beam_.settle(rays_, in_pairs);
     uint64_t changed = 0;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
                        lane = pairs_[i] / BeamPackets::CAPACITY;
-        if (query == Query::closest && !beam_.is_settled(n))
-            beam_.settle(rays_, n);
         const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
@@ -317,9 +319,8 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
+    beam_.settle(rays_, ~uint64_t(0));
     for (uint32_t n = 0; n < beam_.count; ++n) {
-        if (!beam_.is_settled(n))
-            beam_.settle(rays_, n);
         BeamPacket &packet = beam_.packets[n];
         decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
     }
