@@ -1,5 +1,5 @@
-// The kd-tree for rays that go alone: nodes of eight children with boxes of their own, and
-// blocks of eight triangles.
+// The kd-tree for rays that go alone, or in small packets: nodes of eight children with
+// boxes of their own, and blocks of eight triangles.
 //
 // Such a ray waits for memory at each step and has but one plane to compute with there. So
 // about three levels of the kd-tree become one node, whose children are tested side by side

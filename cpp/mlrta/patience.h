@@ -31,7 +31,8 @@ private:
 };
 
 // That of this thread, for one kind of beams in one scene: neighbouring tiles are mostly
-// traced by the same thread.
+// traced by the same thread. A scene that takes the place of another in memory begins with
+// its patience, which costs some time at most.
 template <typename Kind>
 Patience &patience_of_thread(const void *scene) {
     struct Known {

@@ -145,7 +145,7 @@ private:
     // In place of a parent, where it is known which rays may enter.
     static constexpr uint32_t TESTED = ~0u;
 
-    // As many rays, or fewer, enter children one by one. Chosen: 1 and 2 are as fast.
+    // As many rays, or fewer, enter children one by one; chosen.
     static constexpr int FEW = 2;
 
     // Children that all of the rays may enter, as far as the frustum tells.
