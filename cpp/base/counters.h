@@ -25,7 +25,7 @@ struct Counters {
     uint64_t tiles = 0;           // for which an entry point was searched
     uint64_t missed_tiles = 0;    // that no leaf can hold a hit for
     uint64_t splits = 0;          // tiles that were split
-    uint64_t fallbacks = 0;       // beams that say nothing, or were given up for packets
+    uint64_t fallbacks = 0;       // beams that say nothing, were given up, or not tried
     uint64_t blockers = 0;        // triangles found to cover a tile's beam
     uint64_t regrouped_rays = 0;  // rays laid out anew for smaller or tidier beams
 

@@ -9,6 +9,7 @@
 // Everything here works for scalars too, so that a formula is written once for both.
 #pragma once
 
+#include "base/mask_register.h"
 #include "base/vec.h"
 
 #include <array>
@@ -205,15 +206,7 @@ bool any_lane(const Mask &mask) {
 template <typename Mask>
 LaneBits to_bits(const Mask &mask) {
     if constexpr (requires { mask.k; }) {
-#if defined(__AVX512F__)
-        // GCC 12 reads back four bytes of a mask of one byte that it has put aside.
-        if constexpr (sizeof(mask.k) == 1) {
-            LaneBits bits;
-            asm("kmovb %1, %0" : "=r"(bits) : "k"(mask.k));
-            return bits;
-        }
-#endif
-        return LaneBits(mask.k);
+        return bits_of_register(mask.k);
     } else if constexpr (requires { mask.bitmask_(); }) {
         return LaneBits(mask.bitmask_());
     } else {

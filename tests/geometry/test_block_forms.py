@@ -92,7 +92,7 @@ def test_what_is_told_is_true(core: ModuleType, scale: float, distance: float) -
                 margin = abs(depth) / 2**23
                 assert Fraction(nearest[i]) < depth - margin, (SEED, i, depth)
                 assert Fraction(farthest[i]) > depth + margin, (SEED, i, depth)
-    if 1e-20 < scale and scale * distance < 1e12:  # else too small or too large to tell
+    if scale > 1e-20 and scale * distance < 1e12:  # else too small or too large to tell
         assert min(certain, missed) > 30, (certain, missed)
-    if 1e-10 < scale and scale * distance < 1e12:
+    if scale > 1e-10 and scale * distance < 1e12:
         assert bounded > 30, bounded
