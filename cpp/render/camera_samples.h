@@ -55,9 +55,12 @@ public:
 private:
     void lay_out(const PixelGroup &group);
     void choose_streams(const PixelGroup &group);
-    void draw();
-    void make_rays(const PixelGroup &group);
-    void refract();
+    void follow_streams(const PixelGroup &group, size_t begin, size_t end);
+    void draw(size_t begin, size_t end);
+    void make_rays(const PixelGroup &group, size_t begin, size_t end);
+    void refract(size_t begin, size_t end);
+    // Where positions on the film of the block that begins there lie.
+    size_t film_offset(size_t begin) const { return wanted_.film_positions ? begin : 0; }
     void make_room_for_numbers(size_t padded);
     bool leaves_out_last() const;
 
@@ -74,14 +77,20 @@ private:
     std::vector<float> column_, row_;
     std::vector<uint32_t> first_stream_;
 
+    static constexpr size_t BLOCK = 256; // rays that are made at a time; chosen
+
+    // Of a block, if all samples belong to one pass, else of all rays.
     std::vector<uint32_t> seed_, stream_;
-    std::vector<float> film_x_, film_y_, lens_u_, lens_v_;
+    // Of a block, if they are not wanted.
+    std::vector<float> film_x_, film_y_;
+    std::vector<float> lens_u_, lens_v_;
     std::vector<std::vector<float>> light_x_, light_y_;
     struct BsdfNumbers {
         std::vector<float> x, y, part;
     };
     std::vector<BsdfNumbers> bsdf_;
     std::vector<NumberPair> pairs_; // in the order in which they are drawn
+    std::vector<NumberPair> block_pairs_; // the same of a block
     std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
 };
 

@@ -69,6 +69,8 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
     }
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);
+    for (ShadedPacket &packet : packets_)
+        packet.hit.origin = in_all_lanes(scene.plane.origin);
 }
 
 void TileRenderer::render(const PixelGroup &group) {
@@ -156,30 +158,38 @@ void TileRenderer::add_background() {
     }
 }
 
+// Packets take each step of shading one after the other: a step is a chain of operations
+// that wait for each other, of which a processor works on several only if they are short.
 void TileRenderer::shade_hits() {
-    HitPacket hit;
-    hit.origin = in_all_lanes(scene_.plane.origin);
     const bool common_origin = scene_.plane.has_common_origin();
-    const UIntPacket lane_number(lane_numbers());
-    for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
-        hit.faces = load<UIntPacket>(&primitive_[first]);
-        hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
-        if (hit.lanes == 0)
-            continue;
-        hit.ray = UIntPacket(uint32_t(first)) + lane_number;
-        for (int k = 0; k < 3; ++k)
-            hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
-        for (int k = 0; k < 3 && !common_origin; ++k)
-            hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
-        hit.first = first;
-        if (scene_.data.objects) {
-            hit.t = load<FloatPacket>(&t_[first]);
-            hit.instances = load<UIntPacket>(&instance_[first]);
+    const size_t at_once = packets_.size() * PACKET_WIDTH;
+    for (size_t begin = 0; begin < samples_.count(); begin += at_once) {
+        const size_t end = std::min(begin + at_once, samples_.count());
+        size_t count = 0;
+        for (size_t first = begin; first < end; first += PACKET_WIDTH) {
+            ShadedPacket &packet = packets_[count];
+            HitPacket &hit = packet.hit;
+            hit.faces = load<UIntPacket>(&primitive_[first]);
+            hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
+            if (hit.lanes == 0)
+                continue;
+            ++count;
+            hit.ray = UIntPacket(uint32_t(first)) + lane_indices();
+            for (int k = 0; k < 3; ++k)
+                hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
+            for (int k = 0; k < 3 && !common_origin; ++k)
+                hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
+            hit.first = first;
+            if (scene_.data.objects) {
+                hit.t = load<FloatPacket>(&t_[first]);
+                hit.instances = load<UIntPacket>(&instance_[first]);
+            }
+            packet.point = surface_of(scene_, faces_, hit, common_origin);
         }
-        const SurfacePoint<FloatPacket> point =
-            surface_of(scene_, faces_, hit, common_origin);
-        write_depth_and_normal(hit, point, first);
-        shade(hit, point);
+        const std::span packets = std::span(packets_).first(count);
+        for (const ShadedPacket &packet : packets)
+            write_depth_and_normal(packet.hit, packet.point, *packet.hit.first);
+        shade(packets);
     }
 }
 
@@ -203,7 +213,23 @@ void TileRenderer::write_depth_and_normal(const HitPacket &hit,
 // Mitsuba's direct.cpp, for BSDF samples see bsdf_light.cpp: light that the surface emits,
 // and shadow rays for light that it reflects. A ray that contributes nothing, however its
 // shadow ray fares, is left out as soon as that is known.
-void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point) {
+void TileRenderer::shade(std::span<ShadedPacket> packets) {
+    for (ShadedPacket &packet : packets)
+        find_reflectance(packet);
+    if (bsdf_rays_ || shadows_.empty())
+        return;
+    for (uint32_t sample = 0; sample < emitter_samples_; ++sample) {
+        for (ShadedPacket &packet : packets)
+            choose_light(packet, sample);
+        for (const ShadedPacket &packet : packets)
+            add_emitter_sample(packet, sample);
+    }
+}
+
+// Adds emission, and with BSDF samples everything.
+void TileRenderer::find_reflectance(ShadedPacket &packet) {
+    const HitPacket &hit = packet.hit;
+    const SurfacePoint<FloatPacket> &point = packet.point;
     const FloatPacket zero(0.0f);
     // Only its sign matters, so the direction need not have unit length.
     const FloatPacket cos_view = -dot(hit.direction, point.shading_normal);
@@ -221,41 +247,56 @@ void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &
         albedo = textured_albedo(
             scene_, {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
             lanes, seen_from_front, albedo);
-    lanes &= not_black(albedo);
-    if (lanes == 0 || shadows_.empty())
+    packet.cos_view = cos_view;
+    packet.albedo = albedo;
+    packet.lanes = lanes & not_black(albedo);
+}
+
+void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
+    if (packet.lanes == 0)
         return;
-    for (uint32_t sample = 0; sample < emitter_samples_; ++sample)
-        add_emitter_sample(hit, point, lanes, cos_view, albedo, sample);
+    packet.choices =
+        choose_emitters(scene_, of_rays(packet.hit, samples_.light_x(sample)));
+    if (scene_.all_emitters_are_points)
+        packet.light =
+            sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p);
 }
 
-void TileRenderer::add_emitter_sample(const HitPacket &hit,
-                                      const SurfacePoint<FloatPacket> &point,
-                                      LaneBits lanes, const FloatPacket &cos_view,
-                                      const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const FloatPacket x = of_rays(hit, samples_.light_x(sample));
-    const FloatPacket y = of_rays(hit, samples_.light_y(sample));
-    const EmitterChoices choices = choose_emitters(scene_, x);
-    for_each_light(
-        scene_, choices, lanes, point.p, y,
-        [&](uint32_t emitter, LaneBits lit, const EmitterSample<FloatPacket> &light) {
-            add_light(hit, point, lit, cos_view, albedo, emitter, light);
-        });
+void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sample) {
+    const EmitterChoices &choices = packet.choices;
+    if (scene_.all_emitters_are_points) {
+        if (packet.lanes != 0)
+            add_light(packet, packet.lanes, packet.light, choices.emitter);
+        return;
+    }
+    for_each_value(choices.emitter, packet.lanes, [&](uint32_t emitter, LaneBits lit) {
+        const FloatPacket y = of_rays(packet.hit, samples_.light_y(sample));
+        add_light(packet, lit, sample_chosen(scene_, emitter, choices, packet.point.p, y),
+                  choices.emitter);
+    });
 }
 
-void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                             LaneBits lanes, const FloatPacket &cos_view,
-                             const Vec3<FloatPacket> &albedo, uint32_t emitter,
-                             const EmitterSample<FloatPacket> &light) {
+// Of the emitters that the lanes chose, all of them points if they are several.
+void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
+                             const EmitterSample<FloatPacket> &light,
+                             const UIntPacket &emitters) {
+    const HitPacket &hit = packet.hit;
+    const SurfacePoint<FloatPacket> &point = packet.point;
     const FloatPacket zero(0.0f), cosine = dot(light.direction, point.shading_normal);
-    const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
+    const FloatPacket cos_light = select(packet.cos_view > zero, cosine, -cosine);
     lanes &= not_black(light.weight) & to_bits(cos_light > zero);
     if (lanes == 0)
         return;
-    const ShadowSegment<FloatPacket> segment =
-        shadow_segment(scene_, offset_, hit, point, emitter, light);
-    const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-    shadows_[emitter].append(lanes, hit, segment.start, segment.target,
-                             (albedo * share) * light.weight);
+    ShadowSegment<FloatPacket> segment;
+    if (offset_ == ShadowOffset::mitsuba)
+        segment = mitsuba_segment(point, light);
+    for_each_value(emitters, lanes, [&](uint32_t emitter, LaneBits lit) {
+        if (offset_ == ShadowOffset::robust)
+            segment = shadow_segment(scene_, offset_, hit, point, emitter, light);
+        const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
+        shadows_[emitter].append(lit, hit, segment.start, segment.target,
+                                 (packet.albedo * share) * light.weight);
+    });
 }
 
 // Adds what surfaces emit towards the camera. Returns the lanes to be shaded; those that

@@ -7,6 +7,7 @@
 #include "mlrta/trace.h"
 #include "render/bsdf_rays.h"
 #include "render/camera_samples.h"
+#include "render/emitter_sampling.h"
 #include "render/face_cache.h"
 #include "render/hit_packet.h"
 #include "render/picture_film.h"
@@ -17,8 +18,10 @@
 #include "render/shadow_offset.h"
 #include "render/spread_samples.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace mlrt {
@@ -71,6 +74,17 @@ struct Sampling {
     uint32_t bsdf_samples = 0;
 };
 
+// A packet on its way from surfaces to shadow rays.
+struct ShadedPacket {
+    HitPacket hit;
+    SurfacePoint<FloatPacket> point;
+    LaneBits lanes = 0; // that reflect light
+    FloatPacket cos_view;
+    Vec3<FloatPacket> albedo;
+    EmitterChoices choices;
+    EmitterSample<FloatPacket> light; // if all emitters are points
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
@@ -97,14 +111,13 @@ private:
     void shade_hits();
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
-    void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
-    void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                            LaneBits lanes, const FloatPacket &cos_view,
-                            const Vec3<FloatPacket> &albedo, uint32_t sample);
-    void add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                   LaneBits lanes, const FloatPacket &cos_view,
-                   const Vec3<FloatPacket> &albedo, uint32_t emitter,
-                   const EmitterSample<FloatPacket> &light);
+    // Packets of which hits and points are known.
+    void shade(std::span<ShadedPacket> packets);
+    void find_reflectance(ShadedPacket &packet);
+    void choose_light(ShadedPacket &packet, uint32_t sample);
+    void add_emitter_sample(const ShadedPacket &packet, uint32_t sample);
+    void add_light(const ShadedPacket &packet, LaneBits lanes,
+                   const EmitterSample<FloatPacket> &light, const UIntPacket &emitters);
     // In bsdf_light.cpp.
     void shade_in_both_ways(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             const UIntPacket &shapes, LaneBits lanes,
@@ -151,6 +164,7 @@ private:
     uint32_t bsdf_samples_;
     std::optional<BsdfRays> bsdf_rays_; // if there are BSDF samples
     PassingRays passing_;
+    std::array<ShadedPacket, 8> packets_; // that are shaded at once; as many are chosen
 };
 
 } // namespace mlrt
