@@ -89,7 +89,7 @@ private:
         std::vector<float> x, y, part;
     };
     std::vector<BsdfNumbers> bsdf_;
-    std::vector<NumberPair> pairs_; // in the order in which they are drawn
+    std::vector<NumberPair> pairs_;       // in the order in which they are drawn
     std::vector<NumberPair> block_pairs_; // the same of a block
     std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
 };

@@ -42,9 +42,8 @@ SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, FaceCache &cach
 SurfacePlane<DoublePacket> plane_of(const PreparedScene &scene, const HitPacket &hit);
 
 // The shadow ray from the hits to samples of any emitters, with Mitsuba's offset.
-inline ShadowSegment<FloatPacket>
-mitsuba_segment(const SurfacePoint<FloatPacket> &point,
-                const EmitterSample<FloatPacket> &light) {
+inline ShadowSegment<FloatPacket> mitsuba_segment(const SurfacePoint<FloatPacket> &point,
+                                                  const EmitterSample<FloatPacket> &light) {
     return {offset_point(point.p, point.face_normal, light.target - point.p), light.target};
 }
 

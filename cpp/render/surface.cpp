@@ -60,7 +60,8 @@ WeightProducts<Double> products_of(const Vec3<Double> &direction,
 // As a ray has them that is known to hit; where they are no numbers, some point of the
 // face.
 template <typename Real>
-Vec2<Real> weights_of(const WeightProducts<DoubleOf<Real>> &products) {
+[[gnu::always_inline]] inline Vec2<Real>
+weights_of(const WeightProducts<DoubleOf<Real>> &products) {
     using Double = DoubleOf<Real>;
     const Double scale = Double(1.0) / products.normal;
     const Real zero(0.0f), one(1.0f);
@@ -94,10 +95,9 @@ SurfacePoint<Real> point_at(const Vec2<Real> &at, const Corners<Part> &corners,
 
 template <typename Real>
 SurfacePoint<Real> point_on(const Vec3<Real> &direction, const HitFace &face) {
-    return point_at(
-        weights_of<Real>(products_of(to_double(direction), face.parts.weights)),
-        face.parts.corners, face.parts.normal,
-        face.vertex_normals ? &face.normals : nullptr);
+    return point_at(weights_of<Real>(products_of(to_double(direction), face.parts.weights)),
+                    face.parts.corners, face.parts.normal,
+                    face.vertex_normals ? &face.normals : nullptr);
 }
 
 // Sets the given lanes.

@@ -255,8 +255,7 @@ void TileRenderer::find_reflectance(ShadedPacket &packet) {
 void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
     if (packet.lanes == 0)
         return;
-    packet.choices =
-        choose_emitters(scene_, of_rays(packet.hit, samples_.light_x(sample)));
+    packet.choices = choose_emitters(scene_, of_rays(packet.hit, samples_.light_x(sample)));
     if (scene_.all_emitters_are_points)
         packet.light =
             sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p);
@@ -287,15 +286,21 @@ void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
     lanes &= not_black(light.weight) & to_bits(cos_light > zero);
     if (lanes == 0)
         return;
-    ShadowSegment<FloatPacket> segment;
-    if (offset_ == ShadowOffset::mitsuba)
-        segment = mitsuba_segment(point, light);
-    for_each_value(emitters, lanes, [&](uint32_t emitter, LaneBits lit) {
-        if (offset_ == ShadowOffset::robust)
-            segment = shadow_segment(scene_, offset_, hit, point, emitter, light);
+    const auto append = [&](uint32_t emitter, LaneBits lit,
+                            const ShadowSegment<FloatPacket> &segment) {
         const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
         shadows_[emitter].append(lit, hit, segment.start, segment.target,
                                  (packet.albedo * share) * light.weight);
+    };
+    if (offset_ == ShadowOffset::mitsuba) {
+        const ShadowSegment<FloatPacket> segment = mitsuba_segment(point, light);
+        for_each_value(emitters, lanes, [&](uint32_t emitter, LaneBits lit) {
+            append(emitter, lit, segment);
+        });
+        return;
+    }
+    for_each_value(emitters, lanes, [&](uint32_t emitter, LaneBits lit) {
+        append(emitter, lit, shadow_segment(scene_, offset_, hit, point, emitter, light));
     });
 }
 
