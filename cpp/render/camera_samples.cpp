@@ -57,7 +57,7 @@ void CameraSamples::make_rays(const PixelGroup &group, size_t begin, size_t end)
     // Whole numbers of pixels, which floats hold exactly.
     const FloatPacket left(float(sampled_.x + int(group.left)));
     const FloatPacket top(float(sampled_.y + int(group.top)));
-    std::vector<float> *mapped =
+    AlignedVector<float> *mapped =
         plane.type == CameraType::orthographic ? origin_ : direction_;
     float *film_x = film_x_.data() + film_offset(begin),
           *film_y = film_y_.data() + film_offset(begin);
@@ -99,20 +99,20 @@ void CameraSamples::lay_out(const PixelGroup &group) {
     side_ = group.side;
     sample_count_ = group.sample_count;
     const size_t padded = (count_ + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
-    for (std::vector<float> *array :
+    for (AlignedVector<float> *array :
          {&column_, &row_, &direction_[0], &direction_[1], &direction_[2]})
         array->resize(padded);
-    for (std::vector<float> *array : {&film_x_, &film_y_})
+    for (AlignedVector<float> *array : {&film_x_, &film_y_})
         array->resize(wanted_.film_positions ? padded : BLOCK);
     make_room_for_numbers(padded);
     if (!scene_.plane.has_common_origin())
-        for (std::vector<float> &array : origin_)
+        for (AlignedVector<float> &array : origin_)
             array.resize(padded);
     if (scene_.plane.type == CameraType::orthographic)
         for (int k = 0; k < 3; ++k)
             std::fill(direction_[k].begin(), direction_[k].end(), scene_.plane.parallel[k]);
     first_stream_.resize(padded);
-    for (std::vector<uint32_t> *array : {&seed_, &stream_})
+    for (AlignedVector<uint32_t> *array : {&seed_, &stream_})
         array->resize(streams_.in_one_pass() ? BLOCK : padded);
     t_min_.assign(padded, scene_.plane.near_clip);
     t_max_.assign(padded, scene_.plane.far_clip);
@@ -150,7 +150,7 @@ void CameraSamples::make_room_for_numbers(size_t padded) {
     if (leaves_out_last())
         pairs_.back().y = nullptr;
     for (BsdfNumbers &numbers : bsdf_) {
-        for (std::vector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
+        for (AlignedVector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
             array->resize(padded);
         pairs_.push_back({numbers.x.data(), numbers.y.data()});
         pairs_.push_back({numbers.part.data(), nullptr});

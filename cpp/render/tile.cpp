@@ -94,7 +94,7 @@ void TileRenderer::make_room() {
     if (scene_.data.objects)
         instance_.resize(padded, NO_INSTANCE);
     values_.resize(target_.channels.count);
-    for (std::vector<float> &channel : values_)
+    for (AlignedVector<float> &channel : values_)
         channel.assign(padded, 0.0f);
     if (target_.cost)
         cost_.assign(padded, 0.0f);
@@ -364,8 +364,8 @@ void TileRenderer::add_moments() {
                                  {0.019334f, 0.119193f, 0.950227f}};
     const int first = target_.channels.moment;
     for (int k = 0; k < 3 && first >= 0; ++k) {
-        std::vector<float> &mean = values_[size_t(first + k)];
-        std::vector<float> &square = values_[size_t(first + 3 + k)];
+        AlignedVector<float> &mean = values_[size_t(first + k)];
+        AlignedVector<float> &square = values_[size_t(first + 3 + k)];
         for (size_t ray = 0; ray < samples_.count(); ++ray) {
             mean[ray] =
                 dot(TO_XYZ[k], Vec3f{values_[0][ray], values_[1][ray], values_[2][ray]});
@@ -377,7 +377,7 @@ void TileRenderer::add_moments() {
 void TileRenderer::write(const PixelGroup &group) {
     add_moments();
     std::vector<const float *> values;
-    for (const std::vector<float> &channel : values_)
+    for (const AlignedVector<float> &channel : values_)
         values.push_back(channel.data());
     target_.film.add(group, samples_.film_x(), samples_.film_y(), values.data());
 

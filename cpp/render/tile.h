@@ -3,6 +3,7 @@
 // cache.
 #pragma once
 
+#include "base/aligned_vector.h"
 #include "base/counters.h"
 #include "mlrta/trace.h"
 #include "render/bsdf_rays.h"
@@ -101,8 +102,8 @@ public:
 private:
     // Camera rays that go on behind an emitter that is to be hidden.
     struct PassingRays {
-        std::vector<uint32_t> ray;
-        std::vector<float> origin[3];
+        AlignedVector<uint32_t> ray;
+        AlignedVector<float> origin[3];
     };
 
     void make_room();
@@ -130,8 +131,8 @@ private:
     void pass_hidden_emitters(); // in hidden_emitters.cpp
     // What rays hit, by ray; distances and instances only if they are wanted.
     struct Hits {
-        std::vector<float> t;
-        std::vector<uint32_t> primitive, instance;
+        AlignedVector<float> t;
+        AlignedVector<uint32_t> primitive, instance;
     };
     void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
                uint32_t *instance);
@@ -153,11 +154,11 @@ private:
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.
-    std::vector<float> t_; // if the depth is wanted, or the scene has objects
-    std::vector<uint32_t> primitive_;
-    std::vector<uint32_t> instance_;         // if the scene has objects
-    std::vector<float> cost_;                // if it is wanted
-    std::vector<std::vector<float>> values_; // by channel of the film
+    AlignedVector<float> t_; // if the depth is wanted, or the scene has objects
+    AlignedVector<uint32_t> primitive_;
+    AlignedVector<uint32_t> instance_;         // if the scene has objects
+    AlignedVector<float> cost_;                // if it is wanted
+    std::vector<AlignedVector<float>> values_; // by channel of the film
 
     std::vector<ShadowRays> shadows_; // one an emitter
     SampleShares shares_;
