@@ -165,7 +165,7 @@ private:
     uint32_t bsdf_samples_;
     std::optional<BsdfRays> bsdf_rays_; // if there are BSDF samples
     PassingRays passing_;
-    std::array<ShadedPacket, 8> packets_; // that are shaded at once; as many are chosen
+    std::array<ShadedPacket, 4> packets_; // that are shaded at once; as many are chosen
 };
 
 } // namespace mlrt
