@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <new>
 #include <numbers>
 
 namespace mlrt {
@@ -184,7 +185,9 @@ void TileRenderer::shade_hits() {
                 hit.t = load<FloatPacket>(&t_[first]);
                 hit.instances = load<UIntPacket>(&instance_[first]);
             }
-            packet.point = surface_of(scene_, faces_, hit, common_origin);
+            // Made in place: an assignment would copy it.
+            new (&packet.point)
+                SurfacePoint<FloatPacket>(surface_of(scene_, faces_, hit, common_origin));
         }
         const std::span packets = std::span(packets_).first(count);
         for (const ShadedPacket &packet : packets)
@@ -256,9 +259,9 @@ void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
     if (packet.lanes == 0)
         return;
     packet.choices = choose_emitters(scene_, of_rays(packet.hit, samples_.light_x(sample)));
-    if (scene_.all_emitters_are_points)
-        packet.light =
-            sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p);
+    if (scene_.all_emitters_are_points) // in place, too
+        new (&packet.light) EmitterSample<FloatPacket>(
+            sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p));
 }
 
 void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sample) {
