@@ -112,7 +112,7 @@ private:
     void shade_hits();
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
-    // Packets of which hits and points are known.
+    // In emitter_light.cpp: packets of which hits and points are known.
     void shade(std::span<ShadedPacket> packets);
     void find_reflectance(ShadedPacket &packet);
     void choose_light(ShadedPacket &packet, uint32_t sample);
