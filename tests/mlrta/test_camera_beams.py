@@ -112,7 +112,6 @@ def test_the_film_bounds_all_rays(core: ModuleType, samples: int) -> None:
 def assert_bounds(
     told: Any, tile: Tile, first: int, count: int, t_min: float, t_max: float
 ) -> None:
-    center_u, center_v, c, s, half_p, half_q = map(Fraction, told["rectangle"])
     lo_u, hi_u, lo_v, hi_v = map(Fraction, told["slopes"])
     assert [packet["first_ray"] for packet in told["packets"]] == list(
         range(first, first + count, 16)
@@ -122,19 +121,48 @@ def assert_bounds(
         assert packet["active"] == 0xFFFF and packet["strays"] == 0
         u, v, main = exact_slopes(told, tile.directions[ray])
         assert lo_u <= u <= hi_u and lo_v <= v <= hi_v, (SEED, ray)
-        du, dv = u - center_u, v - center_v
-        # The sides need not have unit length: coordinates by Cramer's rule.
-        p = (du * c + dv * s) / (c * c + s * s)
-        q = (dv * c - du * s) / (c * c + s * s)
-        assert abs(p) <= half_p and abs(q) <= half_q, (SEED, ray)
-        for box in (packet["box"], packet["box_of_run"]):
-            box_p, box_q, box_half_p, box_half_q = map(Fraction, box)
-            assert abs(p - box_p) <= box_half_p and abs(q - box_q) <= box_half_q, SEED
+        assert_in_boxes(told, packet, u, v)
         least, greatest = map(Fraction, packet["reciprocal_depths"])
         at_end = 0 if t_max == np.inf else 1 / (Fraction(t_max) * main)
         assert least <= at_end <= greatest, (SEED, ray)
         # What lies nearer than that lies before t_min; told of every ray.
         assert Fraction(told["nearest"]) * Fraction(t_min) * main <= 1
+
+
+def assert_in_boxes(told: Any, packet: Any, u: Fraction, v: Fraction) -> None:
+    """That a ray of a packet lies in the rectangle and in the boxes around it."""
+    center_u, center_v, c, s, half_p, half_q = map(Fraction, told["rectangle"])
+    du, dv = u - center_u, v - center_v
+    # The sides need not have unit length: coordinates by Cramer's rule.
+    p = (du * c + dv * s) / (c * c + s * s)
+    q = (dv * c - du * s) / (c * c + s * s)
+    assert abs(p) <= half_p and abs(q) <= half_q, SEED
+    for box in (packet["box"], packet["box_of_run"]):
+        box_p, box_q, box_half_p, box_half_q = map(Fraction, box)
+        assert abs(p - box_p) <= box_half_p and abs(q - box_q) <= box_half_q, SEED
+
+
+@each_core
+def test_beams_of_a_tiny_camera_map_are_turned_as_any_other(core: ModuleType) -> None:
+    """Its squares underflow. Three samples a pixel leave bounds by the film out."""
+    rng = np.random.default_rng([SEED, 7])
+    turned = 0
+    for _ in range(12):
+        tile = random_tile(rng, 3, 8)
+        size = np.float32(0.9 * 2.0**-59 / np.abs(tile.directions).max())
+        rows = [tuple(float(np.float32(x) * size) for x in row) for row in tile.map]
+        tiny = Tile(tile.origin, rows, tile.square, np.float32(tile.directions * size))
+        told = beam_of(core, tiny, 0, tiny.count, 0, np.inf).describe()
+        assert not told["is_by_film"]
+        if any(packet["strays"] for packet in told["packets"]):
+            continue
+        cosine, sine = told["rectangle"][2:4]
+        assert abs(cosine * cosine + sine * sine - 1) < 4 * 2.0**-24, SEED
+        for ray in range(tiny.count):
+            u, v, _ = exact_slopes(told, tiny.directions[ray])
+            assert_in_boxes(told, told["packets"][ray // 16], u, v)
+        turned += 1
+    assert turned > 6, SEED
 
 
 @each_core
