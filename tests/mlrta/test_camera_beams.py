@@ -166,6 +166,30 @@ def test_beams_of_a_tiny_camera_map_are_turned_as_any_other(core: ModuleType) ->
 
 
 @each_core
+def test_the_greatest_sum_holds_in_all_boxes(core: ModuleType) -> None:
+    """Of a film that is seen at a slant, boxes reach beyond the rectangle."""
+    base, dx, dy = (0.0, 0.0, 0.05), (0.06, 0.0, 0.06), (0.0, 0.001, 0.0)
+    square = (0, 0, 16, 1, 0.0, 1.0)
+    code = np.arange(256)
+    column = sum((code >> 2 * bit & 1) << bit for bit in range(4))
+    row = sum((code >> 2 * bit + 1 & 1) << bit for bit in range(4))
+    x, y = np.float32(column + 0.5)[:, None], np.float32(row + 0.5)[:, None]
+    directions = (np.float32(base) + x * np.float32(dx)) + y * np.float32(dy)
+    tile = Tile((0.0, 0.0, 0.0), [base, dx, dy], square, directions)
+    told = beam_of(core, tile, 0, 256, 0, np.inf).describe()
+    assert told["is_by_film"]
+    center_u, center_v, _, _, half_p, half_q = told["rectangle"]
+    beyond = 0
+    for packet in told["packets"]:
+        for p, q, box_half_p, box_half_q in (packet["box"], packet["box_of_run"]):
+            reach_p, reach_q = abs(p) + box_half_p, abs(q) + box_half_q
+            beyond += reach_p > 1.5 * half_p or reach_q > 1.5 * half_q
+            greatest = 1 + abs(center_u) + abs(center_v) + np.sqrt(2) * (reach_p + reach_q)
+            assert greatest <= told["greatest_sum"]
+    assert beyond > 0
+
+
+@each_core
 def test_film_bounds_are_not_much_wider_than_the_rays(core: ModuleType) -> None:
     """Else triangles would be tested in vain."""
     rng = np.random.default_rng(SEED)
