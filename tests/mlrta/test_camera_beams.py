@@ -190,6 +190,18 @@ def test_the_greatest_sum_holds_in_all_boxes(core: ModuleType) -> None:
 
 
 @each_core
+def test_a_tile_without_rays_has_no_hits(core: ModuleType) -> None:
+    tree = build(core, (np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]])))
+    rows = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    none = np.zeros((0, 3), np.float32)
+    for way in WAYS:
+        t, face, _ = core.beam_leaf_selftest.trace_tile(
+            tree, (0.0, 0.0, 0.0), none, rows, (0, 0, 1, 1, 0.0, 1.0), 0.0, np.inf, way
+        )
+        assert len(t) == 0 and len(face) == 0
+
+
+@each_core
 def test_film_bounds_are_not_much_wider_than_the_rays(core: ModuleType) -> None:
     """Else triangles would be tested in vain."""
     rng = np.random.default_rng(SEED)
