@@ -131,6 +131,7 @@ nb::dict describe(const BeamUnderTest &self) {
     dict["side"] = beam.side;
     dict["rectangle"] =
         std::array{r.center_u, r.center_v, r.cosine, r.sine, r.half_p, r.half_q};
+    dict["greatest_sum"] = beam.greatest_sum;
     dict["packets"] = packets;
     return dict;
 }
