@@ -1,6 +1,7 @@
 #include "mlrta/triangle_forms.h"
 
 #include "base/exactness.h"
+#include "base/fused_difference.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
@@ -56,10 +57,16 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
     Real volume;
     if constexpr (EXACT) {
-        const Vec3<DoubleOf<Real>> da = to_double(va);
-        const Vec3<DoubleOf<Real>> normal = cross(to_double(vb) - da, to_double(vc) - da);
+        using Double = DoubleOf<Real>;
+        const Vec3<Double> da = to_double(va);
+        const Vec3<Double> p = to_double(vb) - da, q = to_double(vc) - da;
+        const Vec3<Double> normal{fused_difference(p.z, q.y, Double(p.y * q.z)),
+                                  fused_difference(p.x, q.z, Double(p.z * q.x)),
+                                  fused_difference(p.y, q.x, Double(p.x * q.y))};
         normals[DEPTH] = {Real(normal.x), Real(normal.y), Real(normal.z)};
-        volume = Real(dot(da - to_double(o), normal));
+        const Vec3<Double> to_vertex = da - to_double(o);
+        volume = Real(fused(to_vertex.x, normal.x,
+                            fused(to_vertex.y, normal.y, Double(to_vertex.z * normal.z))));
     } else {
         normals[DEPTH] = cross(ca, ab);
         volume = dot(a, normals[DEPTH]);

@@ -15,18 +15,13 @@
 // certain. The rest is decided exactly.
 #pragma once
 
+#include "base/magnitude.h"
 #include "geometry/triangle.h"
 #include "mlrta/beam_packets.h"
 
 #include <cstdint>
 
 namespace mlrt {
-
-// The greatest absolute value of a component.
-template <typename Real>
-Real largest_component(const Vec3<Real> &v) {
-    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
-}
 
 struct alignas(64) TriangleForms {
     static constexpr uint32_t CAPACITY = WIDE_WIDTH;
