@@ -18,32 +18,55 @@ namespace {
 
 using Rows = nb::ndarray<const float, nb::shape<-1, 3>, nb::c_contig, nb::device::cpu>;
 
-// A beam and the rays that it is made of.
+using Point = std::array<float, 3>;
+
+// A beam and the rays that it is made of: from one origin, or parallel in a scene of the
+// given bounds.
 class BeamUnderTest {
 public:
-    BeamUnderTest(const std::array<float, 3> &origin, const Rows &directions) {
-        count_ = uint32_t(directions.shape(0));
-        t_min_.assign(count_, 0.0f);
-        t_max_.assign(count_, INFINITY);
-        for (int k = 0; k < 3; ++k) {
-            for (uint32_t i = 0; i < count_; ++i)
-                direction_[k].push_back(directions(i, size_t(k)));
-            group_.direction[k] = direction_[k].data();
-        }
-        group_.count = count_;
+    BeamUnderTest(const Point &origin, const Rows &directions) : BeamUnderTest(directions) {
         group_.has_common_origin = true;
         group_.common_origin = {origin[0], origin[1], origin[2]};
-        group_.t_min = t_min_.data();
-        group_.t_max = t_max_.data();
         const KeepDenormals keep;
-        beam.load(group_, 0, count_, nullptr);
+        beam.load(group_, 0, group_.count, nullptr);
+    }
+
+    BeamUnderTest(const Rows &origins, const Rows &directions, const Point &lo,
+                  const Point &hi)
+        : BeamUnderTest(directions) {
+        for (int k = 0; k < 3; ++k) {
+            origin_[k] = column(origins, k);
+            group_.origin[k] = origin_[k].data();
+        }
+        group_.has_common_origin = false;
+        const KeepDenormals keep;
+        beam.load_parallel(group_, 0, group_.count,
+                           {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}});
     }
 
     BeamPackets beam;
 
 private:
-    uint32_t count_;
-    std::vector<float> direction_[3], t_min_, t_max_;
+    explicit BeamUnderTest(const Rows &directions) {
+        group_.count = uint32_t(directions.shape(0));
+        t_min_.assign(group_.count, 0.0f);
+        t_max_.assign(group_.count, INFINITY);
+        for (int k = 0; k < 3; ++k) {
+            direction_[k] = column(directions, k);
+            group_.direction[k] = direction_[k].data();
+        }
+        group_.t_min = t_min_.data();
+        group_.t_max = t_max_.data();
+    }
+
+    static std::vector<float> column(const Rows &rows, int k) {
+        std::vector<float> values;
+        for (size_t i = 0; i < rows.shape(0); ++i)
+            values.push_back(rows(i, size_t(k)));
+        return values;
+    }
+
+    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
     RayGroup group_;
 };
 
@@ -62,6 +85,9 @@ nb::dict describe(const BeamUnderTest &self) {
         };
         one["box"] = std::array{lane(run.center_p), lane(run.center_q), lane(run.half_p),
                                 lane(run.half_q)};
+        const LaneArray<float> u = to_lanes<float>(packet.u), v = to_lanes<float>(packet.v);
+        one["u"] = std::vector<float>(u.begin(), u.end());
+        one["v"] = std::vector<float>(v.begin(), v.end());
         packets.append(one);
     }
     nb::dict dict;
@@ -70,6 +96,10 @@ nb::dict describe(const BeamUnderTest &self) {
     dict["rectangle"] =
         std::array{r.center_u, r.center_v, r.cosine, r.sine, r.half_p, r.half_q};
     dict["packets"] = packets;
+    if (beam.parallel) {
+        dict["origin"] = std::array{beam.origin.x, beam.origin.y, beam.origin.z};
+        dict["slopes"] = std::array{beam.slope_u, beam.slope_v};
+    }
     return dict;
 }
 
@@ -95,8 +125,8 @@ nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
     TriangleForms forms;
     {
         const KeepDenormals keep;
-        forms.set(self.beam, 0, triangles.data(), numbers.data(),
-                  uint32_t(triangles.size()));
+        forms.set(self.beam, self.beam.parallel ? -INFINITY : 0, triangles.data(),
+                  numbers.data(), uint32_t(triangles.size()));
     }
     nb::dict dict;
     dict["possible"] = forms.possible;
@@ -148,8 +178,10 @@ nb::tuple order_of(const BeamUnderTest &self, float share) {
 void bind_beam_leaf_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("beam_leaf_selftest");
     nb::class_<BeamUnderTest>(s, "Beam")
-        .def(nb::init<const std::array<float, 3> &, const Rows &>(), nb::arg("origin"),
+        .def(nb::init<const Point &, const Rows &>(), nb::arg("origin"),
              nb::arg("directions"))
+        .def(nb::init<const Rows &, const Rows &, const Point &, const Point &>(),
+             nb::arg("origins"), nb::arg("directions"), nb::arg("lo"), nb::arg("hi"))
         .def("describe", &describe)
         .def("forms", &forms_of, nb::arg("vertices"))
         .def("grid_may_hit", &grid_may_hit)

@@ -23,6 +23,11 @@
 
 namespace mlrt {
 
+template <typename Real>
+struct LaidRectangle;
+template <typename Real>
+struct VertexBox;
+
 struct alignas(64) TriangleForms {
     static constexpr uint32_t CAPACITY = WIDE_WIDTH;
     static constexpr int DEPTH = 3; // after the three edges
@@ -58,6 +63,15 @@ struct alignas(64) TriangleForms {
     LaneBits possible_for(const BeamPackets::Run &run) const;
 
 private:
+    // What is certain of a volume or an area: that no more than this share of it is error.
+    static constexpr float LARGEST_SHARE = 0.25f;
+
+    template <typename Real>
+    MaskOf<Real> put_box(const LaidRectangle<Real> &rectangle, const VertexBox<Real> &box,
+                         const Real &slack, const MaskOf<Real> &ahead);
+    template <typename Real>
+    Real put_form(int form, const LaidRectangle<Real> &rectangle, const Real &form_1,
+                  const Real &form_u, const Real &form_v);
     template <typename Real, typename Bounds, typename ValueOf>
     MaskOf<Real> may_hit(const Bounds &bounds, const Real &least, ValueOf &&value_of) const;
     template <typename Real>
