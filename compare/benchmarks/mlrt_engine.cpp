@@ -81,8 +81,9 @@ public:
             store(&rays_.t_max[first], in_lanes(block.on_film, view_.far_clip));
         }
         const uint32_t grid = view_.grid;
-        const CameraTile square{view_.camera, tile.x / grid, tile.y / grid,
-                                tile.side / grid, grid * grid};
+        const CameraTile square{view_.camera,          tile.x / grid, tile.y / grid,
+                                tile.side / grid,      grid * grid,   0.5f / float(grid),
+                                1 - 0.5f / float(grid)};
         trace_closest(tree_, rays_.group(view_.camera.origin), options_,
                       {rays_.t.data(), rays_.primitive.data()}, counters_, &square);
     }

@@ -1,6 +1,7 @@
 #include "mlrta/beam.h"
 
 #include "base/check.h"
+#include "base/morton.h"
 #include "base/simd.h"
 #include "traverse/load_packet.h"
 
@@ -178,11 +179,30 @@ std::array<std::array<Range, 3>, 3> exact_slopes(const RayGroup &rays, uint32_t 
     return slope;
 }
 
+// Where no coordinate exceeds those.
+Vec3d direction_error(const CameraMap &camera, double largest_x, double largest_y) {
+    constexpr double u = 0x1p-24;
+    Vec3d delta;
+    for (int k = 0; k < 3; ++k)
+        delta[k] = 4 * u *
+                       (std::abs(camera.base[k]) + largest_x * std::abs(camera.dx[k]) +
+                        largest_y * std::abs(camera.dy[k])) +
+                   0x1p-140;
+    return delta;
+}
+
 } // namespace
+
+Vec3d direction(const CameraMap &camera, double x, double y) {
+    return Vec3d(camera.base) + Vec3d(camera.dx) * x + Vec3d(camera.dy) * y;
+}
+
+Vec3d direction_error(const CameraMap &camera, const FilmRectangle &film) {
+    return direction_error(camera, film.x + film.width, film.y + film.height);
+}
 
 Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, double y1,
                  double t_min, double t_max) {
-    constexpr double u = 0x1p-24;
     Beam beam;
     for (int k = 0; k < 3; ++k)
         beam.origin[k] = {camera.origin[k], camera.origin[k]};
@@ -190,18 +210,11 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
     beam.t_max = t_max;
 
     // In order around the rectangle, as the planes need them.
-    const std::array<Vec2<double>, 4> corners{{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}};
-    std::array<Vec3d, 4> directions;
-    Vec3d delta{};
-    for (int c = 0; c < 4; ++c)
-        directions[c] = Vec3d(camera.base) + Vec3d(camera.dx) * corners[c].x +
-                        Vec3d(camera.dy) * corners[c].y;
-    for (int k = 0; k < 3; ++k) {
-        const double size = std::abs(camera.base[k]) +
-                            std::max(std::abs(x0), std::abs(x1)) * std::abs(camera.dx[k]) +
-                            std::max(std::abs(y0), std::abs(y1)) * std::abs(camera.dy[k]);
-        delta[k] = 4 * u * size + 0x1p-140;
-    }
+    const std::array<Vec3d, 4> directions{
+        direction(camera, x0, y0), direction(camera, x1, y0), direction(camera, x1, y1),
+        direction(camera, x0, y1)};
+    const Vec3d delta = direction_error(camera, std::max(std::abs(x0), std::abs(x1)),
+                                        std::max(std::abs(y0), std::abs(y1)));
     // Of the 4u in delta, rounding to float takes 3u and a little: there is room for the
     // rounding of the corners.
     beam.corners = directions;
@@ -251,25 +264,53 @@ Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, doubl
     return beam;
 }
 
-bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_min,
-               double t_max, Beam &beam) {
+std::optional<FilmRectangle> film_of(const CameraTile &tile, uint32_t first,
+                                     uint32_t count) {
     MLRT_CHECK(uint64_t(first) + count <= uint64_t(tile.size) * tile.size * tile.samples);
+    const auto square = [&](uint32_t code, uint32_t pixels) -> FilmRectangle {
+        const MortonPoint corner = of_morton_code(code);
+        const int levels = std::countr_zero(pixels);
+        const double begin = tile.begin, beyond_last = double(tile.end) - begin - 1;
+        return {(tile.x + corner.column) + begin, (tile.y + corner.row) + begin,
+                (1u << ((levels + 1) / 2)) + beyond_last,
+                (1u << (levels / 2)) + beyond_last};
+    };
+    if (tile.samples % count == 0 && first % count == 0)
+        return square(first / tile.samples, 1);
     if (first % tile.samples != 0 || count % tile.samples != 0)
-        return false;
+        return std::nullopt;
     const uint32_t pixel = first / tile.samples, pixels = count / tile.samples;
     if (!std::has_single_bit(pixels) || pixel % pixels != 0)
+        return std::nullopt;
+    return square(pixel, pixels);
+}
+
+bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_min,
+               double t_max, Beam &beam) {
+    const auto film = film_of(tile, first, count);
+    if (!film)
         return false;
-    // Even bits of a Morton index are x, odd ones y.
-    uint32_t x = 0, y = 0;
-    for (int bit = 0; bit < 16; ++bit) {
-        x |= ((pixel >> (2 * bit)) & 1u) << bit;
-        y |= ((pixel >> (2 * bit + 1)) & 1u) << bit;
-    }
-    const int levels = std::countr_zero(pixels);
-    const double x0 = tile.x + x, y0 = tile.y + y;
-    beam = camera_beam(tile.camera, x0, x0 + (1u << ((levels + 1) / 2)), y0,
-                       y0 + (1u << (levels / 2)), t_min, t_max);
+    beam = camera_beam(tile.camera, film->x, film->x + film->width, film->y,
+                       film->y + film->height, t_min, t_max);
     return true;
+}
+
+CameraRays camera_rays(const RayGroup &rays, const CameraTile &tile) {
+    CameraRays camera{tile, 0, -INFINITY, rays.count > 0};
+    FloatPacket greatest_t_min(0.0f), greatest_t_max(-INFINITY);
+    const FloatPacket first_t_min(rays.t_min[0]), first_t_max(rays.t_max[0]);
+    MaskOf<FloatPacket> alike = true;
+    for (uint32_t i = 0; i < rays.count; i += PACKET_WIDTH) {
+        const FloatPacket t_min = load_padded(rays.t_min, i, rays.count);
+        const FloatPacket t_max = load_padded(rays.t_max, i, rays.count);
+        greatest_t_min = maximum(t_min, greatest_t_min);
+        greatest_t_max = maximum(t_max, greatest_t_max);
+        alike &= (t_min == first_t_min) & (t_max == first_t_max);
+    }
+    camera.t_min = greatest_lane(greatest_t_min);
+    camera.t_max = greatest_lane(greatest_t_max);
+    camera.are_alike = to_bits(alike) == ALL_LANES && camera.t_min < camera.t_max;
+    return camera;
 }
 
 Beam ray_beam(const RayGroup &rays, uint32_t first, uint32_t count) {

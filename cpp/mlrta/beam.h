@@ -12,6 +12,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 
 namespace mlrt {
@@ -62,13 +63,42 @@ struct CameraMap {
 };
 
 // A square of pixels whose rays form a group: pixels in Morton order (x in the even bits),
-// and for each pixel its samples, anywhere in the pixel's unit square.
+// and for each pixel its samples, anywhere in the pixel's unit square or a smaller one.
 struct CameraTile {
     CameraMap camera;
     uint32_t x, y;    // of the lower corner, in film coordinates
     uint32_t size;    // pixels along the side, a power of two
     uint32_t samples; // rays a pixel
+    // Where in their pixel samples begin and end to lie, along both axes.
+    float begin = 0, end = 1;
 };
+
+// A part of the film, in film coordinates.
+struct FilmRectangle {
+    double x, y; // of the lower corner
+    double width, height;
+
+    Vec2<double> middle() const { return {x + 0.5 * width, y + 0.5 * height}; }
+};
+
+// Where the samples of a run of the tile's rays lie, if its pixels are an aligned square or
+// double square, or one.
+std::optional<FilmRectangle> film_of(const CameraTile &tile, uint32_t first,
+                                     uint32_t count);
+
+// The exact direction at a place of the film, and how far a computed one may be from that
+// of its place, by component: delta below.
+Vec3d direction(const CameraMap &camera, double x, double y);
+Vec3d direction_error(const CameraMap &camera, const FilmRectangle &film);
+
+// A camera's tile and what its rays have in common.
+struct CameraRays {
+    CameraTile tile;
+    float t_min, t_max; // no ray begins or ends later, a negative t_min counting as zero
+    bool are_alike;     // all begin and end there, and there is something between
+};
+
+CameraRays camera_rays(const RayGroup &rays, const CameraTile &tile);
 
 // B1: the beam of a rectangle of the film, x in [x0, x1], y in [y0, y1].
 //
@@ -82,8 +112,7 @@ struct CameraTile {
 Beam camera_beam(const CameraMap &camera, double x0, double x1, double y0, double y1,
                  double t_min, double t_max);
 
-// B1 for a run of the tile's rays that is an aligned square or double square of pixels.
-// Returns whether it is one.
+// B1 for a run of the tile's rays. Returns whether there is film_of() it.
 bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_min,
                double t_max, Beam &beam);
 

@@ -11,29 +11,9 @@ namespace mlrt {
 
 namespace {
 
-// A ray goes along with the beam if no other component of its direction exceeds that of the
-// main axis by more than this factor; chosen.
-constexpr float GREATEST_SLOPE = 2;
-
 // Slopes that are smaller, but not zero, lose digits on the way to where planes are
 // crossed.
 constexpr float SMALLEST_SLOPE = 0x1p-100f;
-
-// Where all rays go straight along the axis, there is nothing to round, but extents that
-// others divide by must not be zero.
-constexpr float LEAST_SLACK = 0x1p-120f;
-
-// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those
-// of what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
-constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
-constexpr float SMALLEST_DEPTH = 0x1p-120f;
-
-// Ends of rays below it: what is lost to underflow is small beside what is above.
-constexpr float SMALLEST_END = 0x1p-60f;
-
-// Distances below it may be denormal once they are rounded, and then equal where depths
-// differ: of none of them it is certain which one is nearer.
-constexpr float SMALLEST_DISTANCE = 0x1p-125f;
 
 } // namespace
 
@@ -90,8 +70,18 @@ FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
         packet.strays =
             finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
 
-    // One division for both bounds. What is rounded to a small t_max may exceed it by more
-    // than that share, and small depths may have lost digits: nothing is certain of them.
+    set_ends(packet, t_max, main);
+    return masked(packet.active,
+                  maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
+                          (1 + WIDEN_DEPTH) +
+                      SMALLEST_DEPTH,
+                  0.0f);
+}
+
+// One division for both bounds. What is rounded to a small t_max may exceed it by more than
+// that share, and small depths may have lost digits: nothing is certain of them.
+void BeamPackets::set_ends(BeamPacket &packet, const FloatPacket &t_max,
+                           const FloatPacket &main) const {
     const FloatPacket end = t_max * main;
     const FloatPacket at_end = 1.0f / end;
     const auto moderate = (t_max >= SMALLEST_END) & (end >= SMALLEST_END);
@@ -99,11 +89,27 @@ FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
         masked(packet.active,
                select(moderate, at_end * (1 - WIDEN_DEPTH), FloatPacket(0.0f)), INFINITE);
     packet.greatest = select(moderate, at_end * (1 + WIDEN_DEPTH), FloatPacket(INFINITE));
-    return masked(packet.active,
-                  maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
-                          (1 + WIDEN_DEPTH) +
-                      SMALLEST_DEPTH,
-                  0.0f);
+}
+
+// Of a packet whose rays are known to be active.
+void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
+    BeamPacket &packet = packets[number];
+    const auto component = [&](int axis) {
+        return mlrt::load<FloatPacket>(rays.direction[axis] + packet.first_ray);
+    };
+    const FloatPacket main = component(axes[2]) * side;
+    const FloatPacket reciprocal = 1.0f / main;
+    packet.u = component(axes[0]) * reciprocal;
+    packet.v = component(axes[1]) * reciprocal;
+    packet.primitive = UIntPacket(NO_PRIMITIVE);
+    set_ends(packet, mlrt::load<FloatPacket>(rays.t_max + packet.first_ray), main);
+    unloaded &= ~(uint64_t(1) << number);
+}
+
+void BeamPackets::load_slopes(const RayGroup &rays) {
+    for (uint32_t n = 0; n < count; ++n)
+        if (unloaded >> n & 1)
+            load_camera_packet(rays, n);
 }
 
 // The image of the film's x axis in slopes, at the first packet.
@@ -240,6 +246,25 @@ void BeamPackets::fit_rectangle() {
     }
 }
 
+void BeamPackets::settle_packet(const RayGroup &rays, uint32_t number) {
+    if (unloaded >> number & 1)
+        load_camera_packet(rays, number);
+    if (!is_covered(number))
+        return;
+    BeamPacket &packet = packets[number];
+    const Cover &cover = covers[number];
+    covered &= ~(uint64_t(1) << number);
+    const FloatPacket depth =
+        fused(packet.u, FloatPacket(cover.of_u),
+              fused(packet.v, FloatPacket(cover.of_v), FloatPacket(cover.constant)));
+    const FloatPacket error(cover.error);
+    packet.found = packet.active;
+    packet.primitive = UIntPacket(cover.primitive);
+    packet.least =
+        masked(packet.active, fused(depth, FloatPacket(cover.shrink), -error), INFINITE);
+    packet.greatest = fused(depth, FloatPacket(cover.grow), error);
+}
+
 void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
                        const CameraMap *camera) {
     parallel = false;
@@ -248,12 +273,14 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     any_active = any_stray = false;
     if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
         return;
+    covered = unloaded = 0;
     const BeamPacket *first_active = nullptr;
-    FloatPacket begin = 0.0f;
+    FloatPacket begin = 0.0f, end = 0.0f;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
         BeamPacket &packet = packets[count++];
         packet.first_ray = i;
         begin = maximum(load_packet(rays, first + ray_count, packet), begin);
+        end = maximum(masked(packet.active, packet.greatest, 0.0f), end);
         if (packet.active != 0 && !first_active)
             first_active = &packet;
         any_stray |= packet.strays != 0;
@@ -271,6 +298,8 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     else
         turn_as_rays();
     fit_rectangle();
+    for (uint32_t r = 0; r < run_count(); ++r)
+        runs[r].greatest.fill(greatest_lane(end));
 }
 
 } // namespace mlrt

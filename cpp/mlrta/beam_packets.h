@@ -15,9 +15,12 @@
 
 #include "base/simd.h"
 #include "mlrta/beam.h"
+#include "mlrta/range.h"
+#include "traverse/parameter_interval.h"
 #include "traverse/ray_group.h"
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -87,13 +90,38 @@ struct BeamPackets {
     };
     std::array<Begin, CAPACITY> begins; // of parallel packets
 
-    // Bounds of sixteen packets side by side, as RayBounds has them, and of all sixteen.
+    // Bounds of sixteen packets side by side, as RayBounds has them, and of all sixteen;
+    // and a bound of `greatest` of each packet's active rays.
     struct Run {
         FloatPacket center_p, center_q, half_p, half_q;
-        LaneArray<float> least;
+        LaneArray<float> least, greatest;
         RayBounds all;
     };
     std::array<Run, RUNS> runs;
+
+    // Packets that one triangle covers, nearer than all else that was found, and the linear
+    // form of its reciprocal depths. Their rays are told so by settle().
+    struct Cover {
+        uint32_t primitive;
+        float constant, of_u, of_v;
+        float shrink, grow, error;
+    };
+    uint64_t covered;
+    std::array<Cover, CAPACITY> covers;
+
+    bool is_covered(uint32_t number) const { return covered >> number & 1; }
+
+    // Packets of a camera's rays that have not been looked at: of those only `first_ray`,
+    // `active`, `found` and `strays` are known.
+    uint64_t unloaded;
+
+    // Makes all known of those of the given packets of which it is not.
+    void settle(const RayGroup &rays, uint64_t numbers) {
+        for (uint64_t left = numbers & (covered | unloaded); left != 0; left &= left - 1)
+            settle_packet(rays, uint32_t(std::countr_zero(left)));
+    }
+    // Makes the slopes of all packets known.
+    void load_slopes(const RayGroup &rays);
 
     uint32_t run_count() const { return (count + PACKET_WIDTH - 1) / PACKET_WIDTH; }
 
@@ -102,6 +130,11 @@ struct BeamPackets {
     // is, else as the rays spread.
     void load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
               const CameraMap *camera);
+
+    // The same for rays of a camera, which are looked at when they are needed. Returns
+    // false, and does nothing of use, where that is not possible.
+    bool load_camera(const RayGroup &rays, uint32_t first, uint32_t ray_count,
+                     const CameraRays &camera);
 
     // The same for rays with a common direction in a scene with the given bounds. Rays that
     // go another way are strays, or all of them if too little is certain of where they are.
@@ -131,6 +164,26 @@ private:
     // slopes and depths.
     static constexpr float SMALLEST_MAIN = 0x1p-60f, LARGEST_MAIN = 0x1p60f;
 
+    // A ray goes along with the beam if no other component of its direction exceeds that of
+    // the main axis by more than this factor; chosen.
+    static constexpr float GREATEST_SLOPE = 2;
+
+    // Where all rays go straight along the axis, there is nothing to round, but extents
+    // that others divide by must not be zero.
+    static constexpr float LEAST_SLACK = 0x1p-120f;
+
+    // Of a depth t |d_k|: the rounding of a distance to float, that of the product, and
+    // those of what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
+    static constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
+    static constexpr float SMALLEST_DEPTH = 0x1p-120f;
+
+    // Ends of rays below it: what is lost to underflow is small beside what is above.
+    static constexpr float SMALLEST_END = 0x1p-60f;
+
+    // Distances below it may be denormal once they are rounded, and then equal where depths
+    // differ: of none of them it is certain which one is nearer.
+    static constexpr float SMALLEST_DISTANCE = 0x1p-125f;
+
     static FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
         return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
     }
@@ -144,6 +197,11 @@ private:
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last,
                                      BeamPacket &packet, Begin &begin,
                                      FloatPacket &reach) const;
+    void settle_packet(const RayGroup &rays, uint32_t number);
+    void load_camera_packet(const RayGroup &rays, uint32_t number);
+    void set_ends(BeamPacket &packet, const FloatPacket &t_max,
+                  const FloatPacket &main) const;
+    void set_camera_ends(float t_min, float t_max, const Range &main);
     void load_around(uint32_t middle, const RayGroup &rays, uint32_t first,
                      uint32_t ray_count);
     std::optional<uint32_t> stray_of_most() const;

@@ -23,7 +23,7 @@ public:
 
     // `camera` has made the rays, if it is given.
     BeamTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-               const CameraMap *camera, Output output, Counters &counters,
+               const CameraRays *camera, Output output, Counters &counters,
                BeamMemory &memory, uint32_t regroupings = 0)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
@@ -58,8 +58,8 @@ private:
         BeamPackets &beam = beam_;
         if constexpr (PARALLEL)
             beam.load_parallel(rays_, first, count, tree_.bounds);
-        else
-            beam.load(rays_, first, count, camera_);
+        else if (!film_bounds_pay() || !beam.load_camera(rays_, first, count, *camera_))
+            beam.load(rays_, first, count, camera_ ? &camera_->tile.camera : nullptr);
         if (!beam.any_active) {
             if (PARALLEL && beam.any_stray) // too little is certain of all of them
                 packets_.trace(first, count, frontier);
@@ -110,18 +110,36 @@ private:
                 cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
         counters_.fallbacks += !done;
         for (uint32_t n = 0; n < beam.count; ++n)
-            finish(beam.packets[n], done, frontier);
+            finish(n, done, frontier);
         if (beam.any_stray)
             trace_strays(frontier);
         packets_.flush();
     }
 
+    // Whether bounds by the film are narrow, or few triangles are tested against them.
+    bool film_bounds_pay() const {
+        return camera_ && (camera_->tile.begin == camera_->tile.end ||
+                           memory_.triangles_per_ray <= LOOSE_TRIANGLES_PER_RAY);
+    }
+
     // Writes what a packet has found, or leaves the rest of it to others.
-    void finish(const BeamPacket &packet, bool done, const Frontier &frontier) {
+    void finish(uint32_t number, bool done, const Frontier &frontier) {
+        if (!EXACT && beam_.is_covered(number))
+            beam_.settle(rays_, uint64_t(1) << number);
+        const BeamPacket &packet = beam_.packets[number];
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
             output_.set(packet.first_ray, packet.found);
             left &= ~packet.found;
+        } else if (done && beam_.is_covered(number)) {
+            const UIntPacket primitive(beam_.covers[number].primitive);
+            if (output_.wants_distances())
+                output_.set(packet.first_ray, packet.active,
+                            memory_.distances.of(rays_, packet.first_ray, packet.active,
+                                                 primitive, counters_),
+                            primitive);
+            else
+                output_.set(packet.first_ray, packet.active, primitive);
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
                 output_.set(packet.first_ray, packet.found, distances_of(packet),
@@ -222,6 +240,11 @@ private:
     // that too, by the frames of office, conference, sponza and building.
     static constexpr float LARGE_TRIANGLES_PER_RAY = 0.1f;
 
+    // Where beams met more triangles a ray, those of a camera are bounded by their rays,
+    // and not by the film if that leaves open where in a pixel they lie. Chosen from 0.1
+    // and no limit, by frames of conference.
+    static constexpr float LOOSE_TRIANGLES_PER_RAY = 0.1f;
+
     // How often a ray is regrouped. Slopes that fall off as powers do are cut one ray at a
     // time, which would take a beam's rays squared, and as many frames of the stack as it
     // has rays. Halves take log2(SMALL_BEAM / PACKET_WIDTH) cuts; uneven ones a few more.
@@ -243,7 +266,7 @@ private:
     const KdTree &tree_;
     const RayGroup &rays_;
     const TraceOptions &options_;
-    const CameraMap *camera_;
+    const CameraRays *camera_;
     Output output_;
     Counters &counters_;
     BeamMemory &memory_;

@@ -92,6 +92,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     triangles_left_ -= std::min(triangles_left_, tested);
     tested_ += tested;
     if (tested_ > DENSE_TRIANGLES && !dense_) {
+        beam_.load_slopes(rays_);
         grid_.fill(beam_);
         dense_ = true;
     }
@@ -101,11 +102,24 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
+    bool any_covered = false;
+    uint64_t in_pairs = 0; // packets
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const BeamPackets::Run &run = beam_.runs[n];
         const LaneBits triangles = one_run ? possible : possible & forms.possible_for(run);
         for_each_lane(triangles, [&](uint32_t lane) {
-            const LaneBits packets = forms.packets_for(lane, run);
+            LaneBits packets;
+            if constexpr (query == Query::any) {
+                packets = forms.packets_for(lane, run);
+            } else {
+                const auto coverage = forms.coverage_of(lane, beam_, run);
+                packets = coverage.possible & ~coverage.covered;
+                in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
+                if (coverage.covered != 0) {
+                    cover(n, coverage, forms, lane, numbers[lane]);
+                    any_covered = true;
+                }
+            }
             const uint32_t first = lane * BeamPackets::CAPACITY + n * PACKET_WIDTH;
             store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
                              packets);
@@ -113,6 +127,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         });
     }
     counters_.triangle_tests += pairs;
+    if constexpr (query == Query::closest)
+        beam_.settle(rays_, in_pairs);
     uint64_t changed = 0;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
@@ -129,7 +145,36 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         });
     if (changed != 0)
         update_least(changed);
+    else if (any_covered)
+        update_least();
     for_each_lane(forms.unsafe, [&](uint32_t lane) { test_unsafe(numbers[lane]); });
+}
+
+// Packets of a run, of which a triangle covers some.
+template <Query query>
+void BeamTriangleTests<query>::cover(uint32_t number,
+                                     const TriangleForms::Coverage &coverage,
+                                     const TriangleForms &forms, uint32_t lane,
+                                     uint32_t primitive) {
+    BeamPackets::Run &run = beam_.runs[number];
+    const auto mask = from_bits<FloatPacket>(coverage.covered);
+    const auto raise = [&](LaneArray<float> &bounds, const FloatPacket &to) {
+        store(bounds.data(), select(mask, to, load<FloatPacket>(bounds)));
+    };
+    raise(run.least, coverage.least);
+    raise(run.greatest, coverage.greatest);
+    run.all.least = least_lane(load<FloatPacket>(run.least));
+    const uint32_t first = number * PACKET_WIDTH;
+    beam_.covered |= uint64_t(coverage.covered) << first;
+    constexpr int DEPTH = TriangleForms::DEPTH;
+    const BeamPackets::Cover cover{primitive,
+                                   forms.constant[DEPTH][lane],
+                                   forms.of_u[DEPTH][lane],
+                                   forms.of_v[DEPTH][lane],
+                                   EXACT ? forms.depth_shrink[lane] : 1.0f,
+                                   EXACT ? forms.depth_grow[lane] : 1.0f,
+                                   EXACT ? forms.depth_error[lane] : 0.0f};
+    for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
 // One triangle against sixteen rays. Returns whether they found something.
@@ -274,6 +319,7 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
+    beam_.settle(rays_, ~uint64_t(0));
     for (uint32_t n = 0; n < beam_.count; ++n) {
         BeamPacket &packet = beam_.packets[n];
         decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
@@ -292,6 +338,7 @@ void BeamTriangleTests<query>::update_least(uint64_t packets) {
         BeamPackets::Run &run = beam_.runs[n];
         for_each_lane(changed, [&](uint32_t i) {
             run.least[i] = least_lane(beam_.packets[n * PACKET_WIDTH + i].least);
+            run.greatest[i] = INFINITE;
         });
         run.all.least = least_lane(load<FloatPacket>(run.least));
     }

@@ -49,6 +49,8 @@ public:
 
 private:
     void test_block(const uint32_t *numbers, uint32_t count);
+    void cover(uint32_t run, const TriangleForms::Coverage &coverage,
+               const TriangleForms &forms, uint32_t lane, uint32_t primitive);
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);

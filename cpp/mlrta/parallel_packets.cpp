@@ -145,6 +145,7 @@ void BeamPackets::load_around(uint32_t middle, const RayGroup &rays, uint32_t fi
 void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t ray_count,
                                 const Box3f &scene) {
     parallel = true;
+    covered = unloaded = 0;
     nearest = 0;
     count = 0;
     any_active = any_stray = false;

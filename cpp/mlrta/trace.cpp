@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 
 namespace mlrt {
 
@@ -22,8 +23,8 @@ template <typename Runs>
 class TileTracer {
 public:
     TileTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-               const CameraTile *tile, Runs &runs, Counters &counters)
-        : tree_(tree), rays_(rays), options_(options), tile_(tile), runs_(runs),
+               const CameraRays *camera, Runs &runs, Counters &counters)
+        : tree_(tree), rays_(rays), options_(options), camera_(camera), runs_(runs),
           counters_(counters),
           minimum_tile_(options.minimum_tile ? options.minimum_tile : Runs::MINIMUM_TILE),
           most_entries_(options.frontier ? options.frontier : Runs::FRONTIER) {}
@@ -36,8 +37,6 @@ public:
             return;
         }
         const uint32_t initial = options_.initial_tile * options_.initial_tile;
-        if (tile_ != nullptr)
-            find_ends();
         for (uint32_t first = 0; first < rays_.count; first += initial)
             trace_tile(first, std::min(initial, rays_.count - first), root,
                        std::numeric_limits<double>::infinity());
@@ -51,8 +50,8 @@ private:
         ++counters_.tiles;
         RayCost cost(rays_, counters_);
         Beam beam;
-        if (tile_ == nullptr ||
-            !tile_beam(*tile_, first, count, greatest_t_min_, greatest_t_max_, beam))
+        if (!camera_ ||
+            !tile_beam(camera_->tile, first, count, camera_->t_min, camera_->t_max, beam))
             beam = ray_beam(rays_, first, count);
         beam.t_max = std::min(beam.t_max, t_end);
         BeamJudge judge(tree_, beam, options_, counters_);
@@ -77,25 +76,13 @@ private:
         });
     }
 
-    // Of all rays, since those of a camera have the same.
-    void find_ends() {
-        FloatPacket t_min(0.0f), t_max(-std::numeric_limits<float>::infinity());
-        for (uint32_t i = 0; i < rays_.count; i += PACKET_WIDTH) {
-            t_min = maximum(load_padded(rays_.t_min, i, rays_.count), t_min);
-            t_max = maximum(load_padded(rays_.t_max, i, rays_.count), t_max);
-        }
-        greatest_t_min_ = greatest_lane(t_min);
-        greatest_t_max_ = greatest_lane(t_max);
-    }
-
     const KdTree &tree_;
     const RayGroup &rays_;
     const TraceOptions &options_;
-    const CameraTile *tile_;
+    const CameraRays *camera_;
     Runs &runs_;
     Counters &counters_;
     uint32_t minimum_tile_, most_entries_;
-    double greatest_t_min_ = 0, greatest_t_max_ = 0; // of all rays, for camera tiles
 };
 
 // Whether coordinates are so large that only rays one by one are safe from overflow, as
@@ -121,8 +108,12 @@ template <typename Output>
 void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &asked,
                  const CameraTile *tile, Output output, Counters &counters) {
     const TraceOptions options = safe_options(tree, rays, asked);
+    std::optional<CameraRays> camera;
+    if (tile)
+        camera = camera_rays(rays, *tile);
     const auto trace_runs = [&](auto runs) {
-        TileTracer(tree, rays, options, tile, runs, counters).trace();
+        TileTracer(tree, rays, options, camera ? &*camera : nullptr, runs, counters)
+            .trace();
     };
     output.clear(rays.count);
     const bool beams = options.traversal == Traversal::beam_leaf ||
@@ -140,7 +131,7 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &a
     } else if (beams) {
         BeamMemory memory(tree, rays.common_origin);
         trace_runs(BeamTracer<CommonOrigin, Output>(
-            tree, rays, options, tile ? &tile->camera : nullptr, output, counters, memory));
+            tree, rays, options, camera ? &*camera : nullptr, output, counters, memory));
     } else {
         trace_runs(
             PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));

@@ -136,6 +136,15 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     possible = to_bits(inside) & safe_bits;
 }
 
+template <typename Real, typename Bounds, typename ValueOf>
+TriangleForms::FormRange<Real> TriangleForms::range_of(int form, const Bounds &bounds,
+                                                       ValueOf &&value_of) const {
+    const Real p = value_of(of_p[form]), q = value_of(of_q[form]);
+    return {fused(p, Real(bounds.center_p),
+                  fused(q, Real(bounds.center_q), value_of(center[form]))),
+            fused(absolute(p), Real(bounds.half_p), absolute(q) * Real(bounds.half_q))};
+}
+
 // Whether rays within a rectangle may hit a triangle, nearer than `least`: one triangle and
 // rectangles side by side, or the other way round.
 template <typename Real, typename Bounds, typename ValueOf>
@@ -147,9 +156,7 @@ MaskOf<Real> TriangleForms::may_hit(const Bounds &bounds, const Real &least,
         (absolute(center_p - value_of(box_p)) <= half_p + value_of(box_half_p)) &
         (absolute(center_q - value_of(box_q)) <= half_q + value_of(box_half_q));
     const auto greatest = [&](int form) {
-        const Real p = value_of(of_p[form]), q = value_of(of_q[form]);
-        const Real middle = fused(p, center_p, fused(q, center_q, value_of(center[form])));
-        return middle + fused(absolute(p), half_p, absolute(q) * half_q);
+        return range_of<Real>(form, bounds, value_of).greatest();
     };
     const Real edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
     const Real depth = greatest(DEPTH);
@@ -163,6 +170,37 @@ LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) 
     return to_bits(may_hit(run, load<FloatPacket>(run.least), [lane](const Lanes &lanes) {
         return FloatPacket(lanes[lane]);
     }));
+}
+
+// The least value of a form is the greatest of the negative one, turned around, and has the
+// same error. What is certain of a ray by test_packet() is certain here of all.
+TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPackets &beam,
+                                                   const BeamPackets::Run &run) const {
+    const auto value_of = [lane](const Lanes &lanes) { return FloatPacket(lanes[lane]); };
+    Coverage packets;
+    packets.covered = 0;
+    packets.possible = to_bits(may_hit(run, load<FloatPacket>(run.least), value_of));
+    if (packets.possible == 0)
+        return packets;
+    const auto least = [&](int form) {
+        return range_of<FloatPacket>(form, run, value_of).least();
+    };
+    const FloatPacket edges = minimum(least(0), minimum(least(1), least(2)));
+    const auto inside = edges > (EXACT ? value_of(edge_error) : FloatPacket(0.0f));
+    if ((to_bits(inside) & packets.possible) == 0)
+        return packets;
+    const FormRange<FloatPacket> depth = range_of<FloatPacket>(DEPTH, run, value_of);
+    packets.least = depth.least();
+    packets.greatest = depth.greatest();
+    if constexpr (EXACT) {
+        const FloatPacket error = value_of(depth_error);
+        packets.least = fused(packets.least, value_of(depth_shrink), -error);
+        packets.greatest = fused(packets.greatest, value_of(depth_grow), error);
+    }
+    const auto nearer = (packets.least > load<FloatPacket>(run.greatest)) &
+                        (packets.greatest < FloatPacket(beam.nearest));
+    packets.covered = packets.possible & to_bits(inside & nearer);
+    return packets;
 }
 
 template <typename Real>

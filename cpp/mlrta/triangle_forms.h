@@ -58,8 +58,17 @@ struct alignas(64) TriangleForms {
              const uint32_t *numbers, uint32_t count);
 
     // Packets of a run that triangle `lane` may be hit by, nearer than their rays already
-    // have; and of the possible triangles those that any packet of the run may hit so.
+    // have.
     LaneBits packets_for(uint32_t lane, const BeamPackets::Run &run) const;
+    // The same, and of those the packets of which all active rays hit it for certain,
+    // nearer than they already have: it covers them.
+    struct Coverage {
+        LaneBits possible, covered;
+        FloatPacket least, greatest; // bounds of reciprocal depths, where it covers packets
+    };
+    Coverage coverage_of(uint32_t lane, const BeamPackets &beam,
+                         const BeamPackets::Run &run) const;
+    // Of the possible triangles those that any packet of the run may be hit by so.
     LaneBits possible_for(const BeamPackets::Run &run) const;
 
 private:
@@ -72,6 +81,16 @@ private:
     template <typename Real>
     Real put_form(int form, const LaidRectangle<Real> &rectangle, const Real &form_1,
                   const Real &form_u, const Real &form_v);
+    // Least and greatest value over a rectangle: middle -+ extent.
+    template <typename Real>
+    struct FormRange {
+        Real middle, extent;
+
+        Real least() const { return middle - extent; }
+        Real greatest() const { return middle + extent; }
+    };
+    template <typename Real, typename Bounds, typename ValueOf>
+    FormRange<Real> range_of(int form, const Bounds &bounds, ValueOf &&value_of) const;
     template <typename Real, typename Bounds, typename ValueOf>
     MaskOf<Real> may_hit(const Bounds &bounds, const Real &least, ValueOf &&value_of) const;
     template <typename Real>

@@ -29,7 +29,7 @@ class ExactParallelBeam:
         self.axes = list(told["axes"])
         self.side = Fraction(told["side"])
         self.origin = [Fraction(x) for x in told["origin"]]
-        u, v = map(Fraction, told["slopes"])
+        u, v = map(Fraction, told["common_slopes"])
         # In the order of the coordinates.
         self.along = [Fraction(0)] * 3
         for axis, slope in zip(self.axes, (u, v, self.side), strict=True):
