@@ -1,6 +1,7 @@
 #include "mlrta/hit_distances.h"
 
 #include "base/check.h"
+#include "base/exactness.h"
 #include "base/fused_difference.h"
 #include "base/magnitude.h"
 #include "base/point_doubles.h"
@@ -87,6 +88,10 @@ const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
 template <typename Value>
 HitDistances::Rounded HitDistances::rounded(const Vec3<FloatPacket> &d,
                                             const Planes<Value> &planes) {
+    if constexpr (!EXACT) {
+        const auto of = [&](int k) { return FloatPacket(planes.normal[k]); };
+        return {1.0f / fused(d.x, of(0), fused(d.y, of(1), d.z * of(2))), ALL_LANES};
+    }
     const FloatPacket largest = largest_component(d);
     // Sums keep of each product what the last place of the anchor holds.
     const FloatPacket anchor = largest * FloatPacket(planes.anchor);
