@@ -6,7 +6,7 @@
 
 namespace mlrt {
 
-// Of two. Neither may be NaN.
+// Of two. Where one is NaN, the result is any number.
 template <typename Real>
 Real greatest_size(const Real &a, const Real &b) {
 #if defined(__AVX512DQ__) && defined(__AVX512VL__)

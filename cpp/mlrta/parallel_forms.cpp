@@ -1,5 +1,6 @@
 // Triangles as a beam of parallel rays sees them.
 #include "base/exactness.h"
+#include "base/magnitude.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/form_layout.h"

@@ -1,5 +1,6 @@
 #include "base/exactness.h"
 #include "base/fused_difference.h"
+#include "base/magnitude.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/form_layout.h"

@@ -15,7 +15,6 @@
 // certain. The rest is decided exactly.
 #pragma once
 
-#include "base/magnitude.h"
 #include "geometry/triangle.h"
 #include "mlrta/beam_packets.h"
 
