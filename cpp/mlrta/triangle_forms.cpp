@@ -57,23 +57,6 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     const LaneBits given = (1u << count) - 1;
     MaskOf<Real> safe = EXACT ? size < LARGEST_SIZE : MaskOf<Real>(true);
 
-    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
-    // two products and a sum follow, and the middle and extent of all: less than 16 of at
-    // most the greatest coordinate and S.
-    const LaidRectangle<Real> rectangle(beam.rectangle);
-    const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
-        const Real reciprocal = 1.0f / (v.z * beam.side);
-        return {v.x * reciprocal, v.y * reciprocal};
-    };
-    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
-    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
-    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
-                       SMALLEST_DEPTH;
-    const LaneBits seen = to_bits(put_box(rectangle, box, slack, ahead & safe)) & given;
-    possible = unsafe = 0;
-    if (seen == 0)
-        return;
-
     const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
     Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
     Real volume;
@@ -107,16 +90,34 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
         depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
                       sum * inverse_size;
-        unsafe = seen & ~to_bits(safe);
+        unsafe = given & ~to_bits(safe);
     } else {
         share = edge_bound = depth_bound = Real(0.0f);
+        unsafe = 0;
     }
-    const LaneBits safe_bits = to_bits(safe) & seen;
+    const LaneBits safe_bits = to_bits(safe) & given;
+    possible = 0;
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
 
-    MaskOf<Real> inside = true;
+    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
+    // two products and a sum follow, and the middle and extent of all: less than 16 of at
+    // most the greatest coordinate and S.
+    const LaidRectangle<Real> rectangle(beam.rectangle);
+    const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
+        const Real reciprocal = 1.0f / (v.z * beam.side);
+        return {v.x * reciprocal, v.y * reciprocal};
+    };
+    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
+    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
+    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
+                       SMALLEST_DEPTH;
+    MaskOf<Real> inside = safe & put_box(rectangle, box, slack, ahead);
+    possible = to_bits(inside) & safe_bits;
+    if (possible == 0)
+        return;
+
     Real greatest;
     for (int form = 0; form < 4; ++form) {
         greatest =
