@@ -4,7 +4,7 @@
 // A packet is 16 lanes on every processor; narrower instruction sets run it in two or four
 // parts. Arithmetic is plain IEEE: the same operations in the same order give the same bits
 // on all of them. Division is true division: approximate reciprocals differ between
-// processors.
+// processors (see reciprocal_estimate.h for where they may be used).
 //
 // Everything here works for scalars too, so that a formula is written once for both.
 #pragma once

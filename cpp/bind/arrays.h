@@ -24,12 +24,12 @@ nanobind::object to_numpy(std::vector<Stored> &&values,
     return nanobind::ndarray<nanobind::numpy, T>(data, shape, owner).cast();
 }
 
-template <typename T>
-nanobind::object to_numpy(std::unique_ptr<T[]> values,
+template <typename T, typename Delete>
+nanobind::object to_numpy(std::unique_ptr<T[], Delete> values,
                           std::initializer_list<size_t> shape) {
     T *data = values.get();
     const nanobind::capsule owner(data, [](void *p) noexcept {
-        const std::unique_ptr<T[]> freed(static_cast<T *>(p));
+        const std::unique_ptr<T[], Delete> freed(static_cast<T *>(p));
     });
     values.release();
     return nanobind::ndarray<nanobind::numpy, T>(data, shape, owner).cast();

@@ -44,31 +44,47 @@ CameraTile camera_tile(const Point &origin, const std::array<Point, 3> &map,
             end};
 }
 
-// Rays of a common origin.
+// Rays of a common origin, or each with its own.
 class RaysUnderTest {
 public:
-    RaysUnderTest(const Point &origin, const Rows &directions, float t_min, float t_max) {
-        count_ = uint32_t(directions.shape(0));
-        t_min_.assign(count_, t_min);
-        t_max_.assign(count_, t_max);
-        for (int k = 0; k < 3; ++k) {
-            for (uint32_t i = 0; i < count_; ++i)
-                direction_[k].push_back(directions(i, size_t(k)));
-            group_.direction[k] = direction_[k].data();
-        }
-        group_.count = count_;
+    RaysUnderTest(const Point &origin, const Rows &directions, float t_min, float t_max)
+        : RaysUnderTest(directions, t_min, t_max) {
         group_.has_common_origin = true;
         group_.common_origin = vec(origin);
-        group_.t_min = t_min_.data();
-        group_.t_max = t_max_.data();
+    }
+    RaysUnderTest(const Rows &origins, const Rows &directions)
+        : RaysUnderTest(directions, 0, INFINITY) {
+        group_.has_common_origin = false;
+        for (int k = 0; k < 3; ++k) {
+            origin_[k] = column(origins, k);
+            group_.origin[k] = origin_[k].data();
+        }
     }
     RaysUnderTest(const RaysUnderTest &) = delete;
 
     const RayGroup &group() const { return group_; }
 
 private:
-    uint32_t count_;
-    std::vector<float> direction_[3], t_min_, t_max_;
+    RaysUnderTest(const Rows &directions, float t_min, float t_max) {
+        group_.count = uint32_t(directions.shape(0));
+        t_min_.assign(group_.count, t_min);
+        t_max_.assign(group_.count, t_max);
+        for (int k = 0; k < 3; ++k) {
+            direction_[k] = column(directions, k);
+            group_.direction[k] = direction_[k].data();
+        }
+        group_.t_min = t_min_.data();
+        group_.t_max = t_max_.data();
+    }
+
+    static std::vector<float> column(const Rows &rows, int k) {
+        std::vector<float> values;
+        for (size_t i = 0; i < rows.shape(0); ++i)
+            values.push_back(rows(i, size_t(k)));
+        return values;
+    }
+
+    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
     RayGroup group_;
 };
 
@@ -93,6 +109,14 @@ public:
             beam.load_camera(rays.group(), first, count, camera_rays(rays.group(), square));
         if (!is_by_film)
             beam.load(rays.group(), first, count, &square.camera);
+    }
+
+    // Parallel rays in a scene of the given bounds.
+    BeamUnderTest(const Rows &origins, const Rows &directions, const Point &lo,
+                  const Point &hi)
+        : rays(origins, directions) {
+        const KeepDenormals keep;
+        beam.load_parallel(rays.group(), 0, rays.group().count, {vec(lo), vec(hi)});
     }
 
     RaysUnderTest rays;
@@ -120,6 +144,12 @@ nb::dict describe(const BeamUnderTest &self) {
             std::array{run.least[n % PACKET_WIDTH], run.greatest[n % PACKET_WIDTH]};
         const RayBounds &all = run.all;
         one["box_of_run"] = std::array{all.center_p, all.center_q, all.half_p, all.half_q};
+        if (beam.parallel) {
+            const LaneArray<float> u = to_lanes<float>(packet.u),
+                                   v = to_lanes<float>(packet.v);
+            one["u"] = std::vector<float>(u.begin(), u.end());
+            one["v"] = std::vector<float>(v.begin(), v.end());
+        }
         packets.append(one);
     }
     nb::dict dict;
@@ -131,7 +161,12 @@ nb::dict describe(const BeamUnderTest &self) {
     dict["side"] = beam.side;
     dict["rectangle"] =
         std::array{r.center_u, r.center_v, r.cosine, r.sine, r.half_p, r.half_q};
+    dict["greatest_sum"] = beam.greatest_sum;
     dict["packets"] = packets;
+    if (beam.parallel) {
+        dict["origin"] = std::array{beam.origin.x, beam.origin.y, beam.origin.z};
+        dict["common_slopes"] = std::array{beam.slope_u, beam.slope_v};
+    }
     return dict;
 }
 
@@ -156,7 +191,8 @@ TriangleForms triangle_forms_of(const BeamPackets &beam, const Rows &vertices) {
         numbers[n] = n;
     TriangleForms forms;
     const KeepDenormals keep;
-    forms.set(beam, 0, triangles.data(), numbers.data(), uint32_t(triangles.size()));
+    forms.set(beam, beam.parallel ? -INFINITY : 0, triangles.data(), numbers.data(),
+              uint32_t(triangles.size()));
     return forms;
 }
 
@@ -251,12 +287,14 @@ nb::tuple trace_tile(const TreeHandle &tree, const Point &origin, const Rows &di
 void bind_beam_leaf_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("beam_leaf_selftest");
     nb::class_<BeamUnderTest>(s, "Beam")
-        .def(nb::init<const std::array<float, 3> &, const Rows &>(), nb::arg("origin"),
+        .def(nb::init<const Point &, const Rows &>(), nb::arg("origin"),
              nb::arg("directions"))
         .def(nb::init<const Point &, const Rows &, const std::array<Point, 3> &,
                       const FilmTile &, uint32_t, uint32_t, float, float>(),
              nb::arg("origin"), nb::arg("directions"), nb::arg("map"), nb::arg("tile"),
              nb::arg("first"), nb::arg("count"), nb::arg("t_min"), nb::arg("t_max"))
+        .def(nb::init<const Rows &, const Rows &, const Point &, const Point &>(),
+             nb::arg("origins"), nb::arg("directions"), nb::arg("lo"), nb::arg("hi"))
         .def("describe", &describe)
         .def("covered_packets", &covered_packets, nb::arg("vertices"))
         .def("forms", &forms_of, nb::arg("vertices"))

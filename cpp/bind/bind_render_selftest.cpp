@@ -192,17 +192,21 @@ nb::dict emitter_packet(const SceneHandle &handle, const Vectors &points,
     const Vec3<FloatPacket> p = packet_of(points), random = packet_of(numbers);
     const EmitterChoices choices = choose_emitters(*handle.scene, random.x);
     Vectors weight(PACKET_WIDTH), direction(PACKET_WIDTH), target(PACKET_WIDTH);
-    for_each_light(*handle.scene, choices, ALL_LANES, p, random.y,
-                   [&](uint32_t, LaneBits lanes, const EmitterSample<FloatPacket> &sample) {
-                       const Vectors weights = vectors_of(sample.weight);
-                       const Vectors directions = vectors_of(sample.direction);
-                       const Vectors targets = vectors_of(sample.target);
-                       for_each_lane(lanes, [&](uint32_t lane) {
-                           weight[lane] = weights[lane];
-                           direction[lane] = directions[lane];
-                           target[lane] = targets[lane];
-                       });
-                   });
+    const PreparedScene &scene = *handle.scene;
+    for_each_value(choices.emitter, ALL_LANES, [&](uint32_t emitter, LaneBits lanes) {
+        const EmitterSample<FloatPacket> sample =
+            scene.all_emitters_are_points
+                ? sample_chosen_points(scene, choices, lanes, p)
+                : sample_chosen(scene, emitter, choices, p, random.y);
+        const Vectors weights = vectors_of(sample.weight);
+        const Vectors directions = vectors_of(sample.direction);
+        const Vectors targets = vectors_of(sample.target);
+        for_each_lane(lanes, [&](uint32_t lane) {
+            weight[lane] = weights[lane];
+            direction[lane] = directions[lane];
+            target[lane] = targets[lane];
+        });
+    });
     const LaneArray<uint32_t> emitters = to_lanes<uint32_t>(choices.emitter);
     nb::dict result;
     result["weight"] = weight;

@@ -275,6 +275,8 @@ std::optional<FilmRectangle> film_of(const CameraTile &tile, uint32_t first,
                 (1u << ((levels + 1) / 2)) + beyond_last,
                 (1u << (levels / 2)) + beyond_last};
     };
+    if (count == 0)
+        return std::nullopt;
     if (tile.samples % count == 0 && first % count == 0)
         return square(first / tile.samples, 1);
     if (first % tile.samples != 0 || count % tile.samples != 0)
@@ -296,7 +298,9 @@ bool tile_beam(const CameraTile &tile, uint32_t first, uint32_t count, double t_
 }
 
 CameraRays camera_rays(const RayGroup &rays, const CameraTile &tile) {
-    CameraRays camera{tile, 0, -INFINITY, rays.count > 0};
+    CameraRays camera{tile, 0, -INFINITY, false};
+    if (rays.count == 0)
+        return camera;
     FloatPacket greatest_t_min(0.0f), greatest_t_max(-INFINITY);
     const FloatPacket first_t_min(rays.t_min[0]), first_t_max(rays.t_max[0]);
     MaskOf<FloatPacket> alike = true;

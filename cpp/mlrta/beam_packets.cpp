@@ -117,11 +117,12 @@ void BeamPackets::turn_as_film(const CameraMap &camera) {
     const auto [i, j, k] = axes;
     const float x = camera.dx[i] - to_lanes<float>(packets[0].u)[0] * side * camera.dx[k];
     const float y = camera.dx[j] - to_lanes<float>(packets[0].v)[0] * side * camera.dx[k];
-    const float length = std::sqrt(x * x + y * y);
+    // In double, where squares neither underflow nor overflow.
+    const double length = std::sqrt(double(x) * x + double(y) * y);
     if (!(length > 0) || !std::isfinite(length))
         return;
-    rectangle.cosine = x / length;
-    rectangle.sine = y / length;
+    rectangle.cosine = float(x / length);
+    rectangle.sine = float(y / length);
 }
 
 // The direction in which slopes vary most: the greater main axis of their covariance.

@@ -76,7 +76,7 @@ struct BeamPackets {
 
     SlopeRectangle rectangle; // holds the slopes of all active rays
     float slope_lo[2], slope_hi[2];
-    float greatest_sum; // of 1 + |u| + |v| in the rectangle
+    float greatest_sum; // of 1 + |u| + |v| in the rectangle and in the boxes of runs
 
     // Of parallel rays: the common slopes and how far those of a ray may deviate from them;
     // the greatest coordinate of an origin, and how far u and v may be from what they are

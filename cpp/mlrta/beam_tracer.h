@@ -139,8 +139,6 @@ private:
 
     // Writes what a packet has found, or leaves the rest of it to others.
     void finish(uint32_t number, bool done, const Frontier &frontier) {
-        if (!EXACT && beam_.is_covered(number))
-            beam_.settle(rays_, uint64_t(1) << number);
         const BeamPacket &packet = beam_.packets[number];
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {

@@ -159,8 +159,6 @@ bool BeamPackets::load_camera(const RayGroup &rays, uint32_t first, uint32_t ray
     rectangle.slack = float(slack);
     rectangle.half_p = float((half_p + slack) * ROUNDED_UP);
     rectangle.half_q = float((half_q + slack) * ROUNDED_UP);
-    greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
-                   2 * (rectangle.half_p + rectangle.half_q);
 
     count = ray_count / PACKET_WIDTH;
     any_active = true;
@@ -177,6 +175,13 @@ bool BeamPackets::load_camera(const RayGroup &rays, uint32_t first, uint32_t ray
 
     const float packet_p = p.reach(*of_packet, 2 * slack);
     const float packet_q = q.reach(*of_packet, 2 * slack);
+    // Boxes may reach beyond the rectangle, since slopes do not change as fast everywhere.
+    // |u| + |v| grows by at most sqrt(2) (|p| + |q|).
+    const FilmRectangle widest =
+        count > PACKET_WIDTH ? *film_of(tile, first, RUN_RAYS) : *of_packet;
+    greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
+                   1.5f * (rectangle.half_p + p.reach(widest, 2 * slack) +
+                           rectangle.half_q + q.reach(widest, 2 * slack));
     const CameraMap &linear = tile.camera;
     const float middle_x = float(0.5 * of_packet->width) + tile.begin;
     const float middle_y = float(0.5 * of_packet->height) + tile.begin;

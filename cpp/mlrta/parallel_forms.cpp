@@ -1,8 +1,9 @@
 // Triangles as a beam of parallel rays sees them.
 #include "base/exactness.h"
+#include "base/magnitude.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
-#include "mlrta/triangle_forms.h"
+#include "mlrta/form_layout.h"
 #include "traverse/parameter_interval.h"
 
 #include <algorithm>
@@ -39,8 +40,6 @@ constexpr float EDGE_ROUNDINGS = 48 * FLOAT_ROUNDOFF;
 // times its slopes. A certain hit stays one at every depth of the triangle, so it passes
 // the triangle within `uncertainty` of (u, v), where depths are at most s.
 constexpr float PLANE_ROUNDINGS = 24 * FLOAT_ROUNDOFF;
-// What is certain of the area: that no more than this share of it is error.
-constexpr float LARGEST_SHARE = 0.25f;
 
 template <typename Real>
 Vec3<Real> in_single(const Vec3<DoubleOf<Real>> &v) {
@@ -111,42 +110,20 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
         return;
     store(edge_error, edge_bound);
 
-    const SlopeRectangle &rectangle = beam.rectangle;
-    const Real center_u(rectangle.center_u), center_v(rectangle.center_v);
-    const Real cosine(rectangle.cosine), sine(rectangle.sine);
-    const Real half_p(rectangle.half_p), half_q(rectangle.half_q);
-    MaskOf<Real> inside = safe;
-
     // Where the vertices lie in the rectangle: two roundings and what double precision
     // leaves, a difference, two products and a sum, and the middle and extent of all.
-    Real lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
-    for (const Vec3<Real> *vertex : {&fa, &fb, &fc}) {
-        const Real du = vertex->x - center_u, dv = vertex->y - center_v;
-        const Real p = fused(du, cosine, dv * sine);
-        const Real q = fused(dv, cosine, -(du * sine));
-        lo_p = minimum(p, lo_p);
-        hi_p = maximum(p, hi_p);
-        lo_q = minimum(q, lo_q);
-        hi_q = maximum(q, hi_q);
-    }
+    const LaidRectangle<Real> rectangle(beam.rectangle);
+    const VertexBox<Real> box(rectangle, {Vec2<Real>{fa.x, fa.y}, Vec2<Real>{fb.x, fb.y},
+                                          Vec2<Real>{fc.x, fc.y}});
     const Real slack = (32 * FLOAT_ROUNDOFF) * (local + rays) +
                        float(DOUBLE_ROUNDINGS) * size + 2.0f * uncertainty;
-    const Real middle_p = 0.5f * (lo_p + hi_p), middle_q = 0.5f * (lo_q + hi_q);
-    const Real extent_p = 0.5f * (hi_p - lo_p) + slack;
-    const Real extent_q = 0.5f * (hi_q - lo_q) + slack;
-    inside &= (absolute(middle_p) <= extent_p + half_p) &
-              (absolute(middle_q) <= extent_q + half_q);
+    MaskOf<Real> inside = safe & put_box(rectangle, box, slack, MaskOf<Real>(true));
     possible = to_bits(inside) & safe_bits;
     if (possible == 0)
         return;
-    store(box_p, middle_p);
-    store(box_q, middle_q);
-    store(box_half_p, extent_p);
-    store(box_half_q, extent_q);
 
     const Vec3<Double> *vertices[3] = {&b, &c, &a};
     const Vec3<Double> *directions[3] = {&bc, &ca, &ab};
-    Real greatest;
     for (int form = 0; form < 4; ++form) {
         Real form_1, form_u, form_v;
         if (form == DEPTH) {
@@ -159,10 +136,7 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
             form_u = -edges[form].y * inverse;
             form_v = edges[form].x * inverse;
         }
-        const Real middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
-        const Real form_p = fused(form_u, cosine, form_v * sine);
-        const Real form_q = fused(form_v, cosine, -(form_u * sine));
-        greatest = middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
+        const Real greatest = put_form(form, rectangle, form_1, form_u, form_v);
         if (form == DEPTH) {
             // The area's error acts on a depth of at most the size.
             const Real slopes = absolute(form_u) + absolute(form_v);
@@ -178,12 +152,6 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
         } else {
             inside &= greatest >= -edge_bound;
         }
-        store(constant[form], form_1);
-        store(of_u[form], form_u);
-        store(of_v[form], form_v);
-        store(center[form], middle);
-        store(of_p[form], form_p);
-        store(of_q[form], form_q);
     }
     possible = to_bits(inside) & safe_bits;
 }

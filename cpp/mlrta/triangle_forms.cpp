@@ -1,8 +1,9 @@
-#include "mlrta/triangle_forms.h"
-
 #include "base/exactness.h"
+#include "base/fused_difference.h"
+#include "base/magnitude.h"
 #include "geometry/triangle_block.h"
 #include "geometry/triangle_test.h"
+#include "mlrta/form_layout.h"
 #include "traverse/parameter_interval.h"
 
 namespace mlrt {
@@ -34,8 +35,6 @@ constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
 // The volume a.N in double: N has a difference, a product and another difference, the rest
 // a difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2.
 constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
-// What is certain of the volume: that no more than this share of it is error.
-constexpr float LARGEST_SHARE = 0.25f;
 
 } // namespace
 
@@ -52,34 +51,42 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     const Vec3<Real> o{Real(beam.origin[i]), Real(beam.origin[j]), Real(beam.origin[k])};
     const Vec3<Real> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
     const Vec3<Real> a = va - o, b = vb - o, c = vc - o;
+    const Real size =
+        maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
+    const Real sum(beam.greatest_sum);
+    const LaneBits given = (1u << count) - 1;
+    MaskOf<Real> safe = EXACT ? size < LARGEST_SIZE : MaskOf<Real>(true);
+
     const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
     Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
     Real volume;
     if constexpr (EXACT) {
-        const Vec3<DoubleOf<Real>> da = to_double(va);
-        const Vec3<DoubleOf<Real>> normal = cross(to_double(vb) - da, to_double(vc) - da);
+        using Double = DoubleOf<Real>;
+        const Vec3<Double> da = to_double(va);
+        const Vec3<Double> p = to_double(vb) - da, q = to_double(vc) - da;
+        const Vec3<Double> normal{fused_difference(p.z, q.y, Double(p.y * q.z)),
+                                  fused_difference(p.x, q.z, Double(p.z * q.x)),
+                                  fused_difference(p.y, q.x, Double(p.x * q.y))};
         normals[DEPTH] = {Real(normal.x), Real(normal.y), Real(normal.z)};
-        volume = Real(dot(da - to_double(o), normal));
+        const Vec3<Double> to_vertex = da - to_double(o);
+        volume = Real(fused(to_vertex.x, normal.x,
+                            fused(to_vertex.y, normal.y, Double(to_vertex.z * normal.z))));
     } else {
         normals[DEPTH] = cross(ca, ab);
         volume = dot(a, normals[DEPTH]);
     }
 
     const Real inverse = 1.0f / volume;
-    const Real sum(beam.greatest_sum);
-    const LaneBits given = (1u << count) - 1;
-    MaskOf<Real> safe = absolute(volume) > SMALLEST_VOLUME;
+    safe &= absolute(volume) > SMALLEST_VOLUME;
     Real share, edge_bound, depth_bound;
     if constexpr (EXACT) {
-        const Real size = maximum(largest_component(a),
-                                  maximum(largest_component(b), largest_component(c)));
         const Real edge = maximum(largest_component(ab),
                                   maximum(largest_component(bc), largest_component(ca)));
         const Real volume_error = float(VOLUME_ROUNDINGS) * (size * (edge * edge)) +
                                   (2 * FLOAT_ROUNDOFF) * absolute(volume);
         const Real inverse_size = absolute(inverse);
         share = volume_error * inverse_size;
-        safe &= (size < LARGEST_SIZE) & (share <= LARGEST_SHARE);
+        safe &= share <= LARGEST_SHARE;
         edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
         depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
                       sum * inverse_size;
@@ -94,62 +101,30 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         return;
     store(edge_error, edge_bound);
 
-    const SlopeRectangle &rectangle = beam.rectangle;
-    const Real center_u(rectangle.center_u), center_v(rectangle.center_v);
-    const Real cosine(rectangle.cosine), sine(rectangle.sine);
-    const Real half_p(rectangle.half_p), half_q(rectangle.half_q);
-    MaskOf<Real> inside = safe;
-
     // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
     // two products and a sum follow, and the middle and extent of all: less than 16 of at
     // most the greatest coordinate and S.
-    Real lo_p(INFINITE), hi_p(-INFINITE), lo_q(INFINITE), hi_q(-INFINITE);
-    for (const Vec3<Real> *vertex_seen : {&a, &b, &c}) {
-        const Real reciprocal = 1.0f / (vertex_seen->z * beam.side);
-        const Real du = vertex_seen->x * reciprocal - center_u;
-        const Real dv = vertex_seen->y * reciprocal - center_v;
-        const Real p = fused(du, cosine, dv * sine);
-        const Real q = fused(dv, cosine, -(du * sine));
-        lo_p = minimum(p, lo_p);
-        hi_p = maximum(p, hi_p);
-        lo_q = minimum(q, lo_q);
-        hi_q = maximum(q, hi_q);
-    }
-    const Real farthest = maximum(maximum(-lo_p, hi_p), maximum(-lo_q, hi_q));
-    const Real slack = (32 * FLOAT_ROUNDOFF) * (farthest + sum);
+    const LaidRectangle<Real> rectangle(beam.rectangle);
+    const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
+        const Real reciprocal = 1.0f / (v.z * beam.side);
+        return {v.x * reciprocal, v.y * reciprocal};
+    };
+    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
+    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
     const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
                        SMALLEST_DEPTH;
-    const Real middle_p = select(ahead, 0.5f * (lo_p + hi_p), Real(0.0f));
-    const Real middle_q = select(ahead, 0.5f * (lo_q + hi_q), Real(0.0f));
-    const Real extent_p = select(ahead, 0.5f * (hi_p - lo_p) + slack, Real(INFINITE));
-    const Real extent_q = select(ahead, 0.5f * (hi_q - lo_q) + slack, Real(INFINITE));
-    inside &= (absolute(middle_p) <= extent_p + half_p) &
-              (absolute(middle_q) <= extent_q + half_q);
+    MaskOf<Real> inside = safe & put_box(rectangle, box, slack, ahead);
     possible = to_bits(inside) & safe_bits;
     if (possible == 0)
         return;
-    store(box_p, middle_p);
-    store(box_q, middle_q);
-    store(box_half_p, extent_p);
-    store(box_half_q, extent_q);
 
     Real greatest;
     for (int form = 0; form < 4; ++form) {
-        const Real form_u = normals[form].x * inverse;
-        const Real form_v = normals[form].y * inverse;
-        const Real form_1 = normals[form].z * (inverse * beam.side);
-        const Real middle = fused(form_u, center_u, fused(form_v, center_v, form_1));
-        const Real form_p = fused(form_u, cosine, form_v * sine);
-        const Real form_q = fused(form_v, cosine, -(form_u * sine));
-        greatest = middle + fused(absolute(form_p), half_p, absolute(form_q) * half_q);
+        greatest =
+            put_form(form, rectangle, Real(normals[form].z * (inverse * beam.side)),
+                     Real(normals[form].x * inverse), Real(normals[form].y * inverse));
         if (form != DEPTH)
             inside &= greatest >= -edge_bound;
-        store(constant[form], form_1);
-        store(of_u[form], form_u);
-        store(of_v[form], form_v);
-        store(center[form], middle);
-        store(of_p[form], form_p);
-        store(of_q[form], form_q);
     }
     // With the exact value y and the computed one x = y (1 + r) + f, |r| <= share <= 1/4
     // and |f| <= depth_bound: y is at most (x + f) (1 + 2 share) and at least (x - f) (1 -

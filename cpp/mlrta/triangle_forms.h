@@ -22,11 +22,10 @@
 
 namespace mlrt {
 
-// The greatest absolute value of a component.
 template <typename Real>
-Real largest_component(const Vec3<Real> &v) {
-    return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
-}
+struct LaidRectangle;
+template <typename Real>
+struct VertexBox;
 
 struct alignas(64) TriangleForms {
     static constexpr uint32_t CAPACITY = WIDE_WIDTH;
@@ -72,6 +71,15 @@ struct alignas(64) TriangleForms {
     LaneBits possible_for(const BeamPackets::Run &run) const;
 
 private:
+    // What is certain of a volume or an area: that no more than this share of it is error.
+    static constexpr float LARGEST_SHARE = 0.25f;
+
+    template <typename Real>
+    MaskOf<Real> put_box(const LaidRectangle<Real> &rectangle, const VertexBox<Real> &box,
+                         const Real &slack, const MaskOf<Real> &ahead);
+    template <typename Real>
+    Real put_form(int form, const LaidRectangle<Real> &rectangle, const Real &form_1,
+                  const Real &form_u, const Real &form_v);
     // Least and greatest value over a rectangle: middle -+ extent.
     template <typename Real>
     struct FormRange {

@@ -14,23 +14,42 @@ CameraSamples::CameraSamples(const PreparedScene &scene, const SampleStreams &st
       wanted_(wanted), light_x_(std::max(1u, wanted.light_samples)),
       light_y_(light_x_.size()), bsdf_(wanted.bsdf_samples) {}
 
+// A block passes all steps before the next one begins, so that numbers are still in the
+// nearest cache where rays are made of them.
 void CameraSamples::generate(const PixelGroup &group) {
     count_ = group.ray_count();
     lay_out(group);
-    choose_streams(group);
-    draw();
-    make_rays(group);
+    if (!streams_.in_one_pass())
+        choose_streams(group);
+    for (size_t begin = 0; begin < padded_count(); begin += BLOCK) {
+        const size_t end = std::min(begin + BLOCK, padded_count());
+        if (streams_.in_one_pass())
+            follow_streams(group, begin, end);
+        draw(begin, end);
+        make_rays(group, begin, end);
+        if (scene_.plane.type == CameraType::thinlens)
+            refract(begin, end);
+    }
 }
 
-void CameraSamples::draw() {
+// Numbers of the rays from begin to end.
+void CameraSamples::draw(size_t begin, size_t end) {
+    block_pairs_ = pairs_;
+    for (NumberPair &pair : block_pairs_) {
+        const size_t offset = pair.x == film_x_.data() ? film_offset(begin) : begin;
+        pair.x = pair.x ? pair.x + offset : nullptr;
+        pair.y = pair.y ? pair.y + offset : nullptr;
+    }
+    const size_t offset = streams_.in_one_pass() ? 0 : begin;
+    const uint32_t *seeds = &seed_[offset], *streams = &stream_[offset];
     if (sampler_.type == SamplerType::independent)
-        draw_numbers(seed_.data(), stream_.data(), padded_count(), pairs_);
+        draw_numbers(seeds, streams, end - begin, block_pairs_);
     else
-        draw_spread_numbers(sampler_, seed_.data(), stream_.data(), padded_count(),
-                            streams_.samples_per_pixel(), pairs_);
+        draw_spread_numbers(sampler_, seeds, streams, end - begin,
+                            streams_.samples_per_pixel(), block_pairs_);
 }
 
-void CameraSamples::make_rays(const PixelGroup &group) {
+void CameraSamples::make_rays(const PixelGroup &group, size_t begin, size_t end) {
     const ImagePlane &plane = scene_.plane;
     const Vec3<FloatPacket> base = in_all_lanes(plane.single.base);
     const Vec3<FloatPacket> dx = in_all_lanes(plane.single.dx);
@@ -38,29 +57,30 @@ void CameraSamples::make_rays(const PixelGroup &group) {
     // Whole numbers of pixels, which floats hold exactly.
     const FloatPacket left(float(sampled_.x + int(group.left)));
     const FloatPacket top(float(sampled_.y + int(group.top)));
-    std::vector<float> *mapped =
+    AlignedVector<float> *mapped =
         plane.type == CameraType::orthographic ? origin_ : direction_;
-    for (size_t i = 0; i < padded_count(); i += PACKET_WIDTH) {
+    float *film_x = film_x_.data() + film_offset(begin),
+          *film_y = film_y_.data() + film_offset(begin);
+    for (size_t i = begin; i < end;
+         i += PACKET_WIDTH, film_x += PACKET_WIDTH, film_y += PACKET_WIDTH) {
         const FloatPacket x =
-            load<FloatPacket>(&film_x_[i]) + (left + load<FloatPacket>(&column_[i]));
+            load<FloatPacket>(film_x) + (left + load<FloatPacket>(&column_[i]));
         const FloatPacket y =
-            load<FloatPacket>(&film_y_[i]) + (top + load<FloatPacket>(&row_[i]));
+            load<FloatPacket>(film_y) + (top + load<FloatPacket>(&row_[i]));
         if (wanted_.film_positions) {
-            store(&film_x_[i], x);
-            store(&film_y_[i], y);
+            store(film_x, x);
+            store(film_y, y);
         }
         const Vec3<FloatPacket> d = (base + x * dx) + y * dy;
         for (int k = 0; k < 3; ++k)
             store(&mapped[k][i], d[k]);
     }
-    if (plane.type == CameraType::thinlens)
-        refract();
 }
 
 // Rays through the middle of the lens become rays through points of it.
-void CameraSamples::refract() {
+void CameraSamples::refract(size_t begin, size_t end) {
     const ImagePlane &plane = scene_.plane;
-    for (size_t i = 0; i < padded_count(); i += PACKET_WIDTH) {
+    for (size_t i = begin; i < end; i += PACKET_WIDTH) {
         const auto [u, v] =
             on_disk(load<FloatPacket>(&lens_u_[i]), load<FloatPacket>(&lens_v_[i]));
         for (int k = 0; k < 3; ++k) {
@@ -79,18 +99,21 @@ void CameraSamples::lay_out(const PixelGroup &group) {
     side_ = group.side;
     sample_count_ = group.sample_count;
     const size_t padded = (count_ + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
-    for (std::vector<float> *array : {&column_, &row_, &film_x_, &film_y_, &direction_[0],
-                                      &direction_[1], &direction_[2]})
+    for (AlignedVector<float> *array :
+         {&column_, &row_, &direction_[0], &direction_[1], &direction_[2]})
         array->resize(padded);
+    for (AlignedVector<float> *array : {&film_x_, &film_y_})
+        array->resize(wanted_.film_positions ? padded : BLOCK);
     make_room_for_numbers(padded);
     if (!scene_.plane.has_common_origin())
-        for (std::vector<float> &array : origin_)
+        for (AlignedVector<float> &array : origin_)
             array.resize(padded);
     if (scene_.plane.type == CameraType::orthographic)
         for (int k = 0; k < 3; ++k)
             std::fill(direction_[k].begin(), direction_[k].end(), scene_.plane.parallel[k]);
-    for (std::vector<uint32_t> *array : {&first_stream_, &seed_, &stream_})
-        array->resize(padded);
+    first_stream_.resize(padded);
+    for (AlignedVector<uint32_t> *array : {&seed_, &stream_})
+        array->resize(streams_.in_one_pass() ? BLOCK : padded);
     t_min_.assign(padded, scene_.plane.near_clip);
     t_max_.assign(padded, scene_.plane.far_clip);
     for (size_t ray = 0; ray < padded; ++ray) {
@@ -127,7 +150,7 @@ void CameraSamples::make_room_for_numbers(size_t padded) {
     if (leaves_out_last())
         pairs_.back().y = nullptr;
     for (BsdfNumbers &numbers : bsdf_) {
-        for (std::vector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
+        for (AlignedVector<float> *array : {&numbers.x, &numbers.y, &numbers.part})
             array->resize(padded);
         pairs_.push_back({numbers.x.data(), numbers.y.data()});
         pairs_.push_back({numbers.part.data(), nullptr});
@@ -153,21 +176,23 @@ bool CameraSamples::leaves_out_last() const {
            wanted_.bsdf_samples == 0 && scene_.all_emitters_are_points;
 }
 
+// Where the passes that samples belong to differ.
 void CameraSamples::choose_streams(const PixelGroup &group) {
-    if (streams_.in_one_pass()) {
-        const uint32_t corner =
-            (group.top * sampled_.width + group.left) * streams_.samples_per_pixel() +
-            group.first_sample;
-        for (size_t ray = 0; ray < padded_count(); ++ray)
-            stream_[ray] = first_stream_[ray] + corner;
-        return;
-    }
     for (size_t i = 0; i < group.offsets.size(); ++i) {
         const Pixel pixel = group.pixel(i);
         streams_.streams(pixel.row * sampled_.width + pixel.column, group.first_sample,
                          group.sample_count, &seed_[i * group.sample_count],
                          &stream_[i * group.sample_count]);
     }
+}
+
+// Where all belong to one.
+void CameraSamples::follow_streams(const PixelGroup &group, size_t begin, size_t end) {
+    const uint32_t corner =
+        (group.top * sampled_.width + group.left) * streams_.samples_per_pixel() +
+        group.first_sample;
+    for (size_t ray = begin; ray < end; ++ray)
+        stream_[ray - begin] = first_stream_[ray] + corner;
 }
 
 } // namespace mlrt

@@ -1,6 +1,7 @@
 // The camera rays of a group of pixels, and the random numbers of their samples.
 #pragma once
 
+#include "base/aligned_vector.h"
 #include "render/filter.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
@@ -55,9 +56,12 @@ public:
 private:
     void lay_out(const PixelGroup &group);
     void choose_streams(const PixelGroup &group);
-    void draw();
-    void make_rays(const PixelGroup &group);
-    void refract();
+    void follow_streams(const PixelGroup &group, size_t begin, size_t end);
+    void draw(size_t begin, size_t end);
+    void make_rays(const PixelGroup &group, size_t begin, size_t end);
+    void refract(size_t begin, size_t end);
+    // Where positions on the film of the block that begins there lie.
+    size_t film_offset(size_t begin) const { return wanted_.film_positions ? begin : 0; }
     void make_room_for_numbers(size_t padded);
     bool leaves_out_last() const;
 
@@ -71,18 +75,24 @@ private:
     // Of the group's corner, where the rays lie: kept for the groups to come, which mostly
     // are squares of the same size.
     uint32_t side_ = 0, sample_count_ = 0;
-    std::vector<float> column_, row_;
-    std::vector<uint32_t> first_stream_;
+    AlignedVector<float> column_, row_;
+    AlignedVector<uint32_t> first_stream_;
 
-    std::vector<uint32_t> seed_, stream_;
-    std::vector<float> film_x_, film_y_, lens_u_, lens_v_;
-    std::vector<std::vector<float>> light_x_, light_y_;
+    static constexpr size_t BLOCK = 256; // rays that are made at a time; chosen
+
+    // Of a block, if all samples belong to one pass, else of all rays.
+    AlignedVector<uint32_t> seed_, stream_;
+    // Of a block, if they are not wanted.
+    AlignedVector<float> film_x_, film_y_;
+    AlignedVector<float> lens_u_, lens_v_;
+    std::vector<AlignedVector<float>> light_x_, light_y_;
     struct BsdfNumbers {
-        std::vector<float> x, y, part;
+        AlignedVector<float> x, y, part;
     };
     std::vector<BsdfNumbers> bsdf_;
-    std::vector<NumberPair> pairs_; // in the order in which they are drawn
-    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
+    std::vector<NumberPair> pairs_;       // in the order in which they are drawn
+    std::vector<NumberPair> block_pairs_; // the same of a block
+    AlignedVector<float> origin_[3], direction_[3], t_min_, t_max_;
 };
 
 } // namespace mlrt

@@ -55,7 +55,7 @@ Distribution::choose_by_comparing_all(const FloatPacket &random) const {
             select(beyond, FloatPacket(weights_[i + 1] * normalization_), probability);
         start = select(beyond, before(i + 1), start);
     }
-    return {index, (random - start) / probability, probability};
+    return {index, start, probability};
 }
 
 // All lanes halve their ranges of entries in step, without branches.
@@ -79,7 +79,7 @@ Distribution::Choices Distribution::choose_by_bisection(const FloatPacket &rando
         select(from_bits<UIntPacket>(is_first), index, index - UIntPacket(1u));
     const FloatPacket start = select(from_bits<FloatPacket>(is_first), FloatPacket(0.0f),
                                      gather(cumulative, previous) * normalization_);
-    return {index, (random - start) / probability, probability};
+    return {index, start, probability};
 }
 
 } // namespace mlrt

@@ -32,7 +32,12 @@ public:
     // The same for sixteen numbers at once.
     struct Choices {
         UIntPacket index;
-        FloatPacket reused, probability;
+        FloatPacket start, probability; // of the numbers that choose the same
+
+        // The random numbers made uniform again.
+        FloatPacket reused(const FloatPacket &random) const {
+            return (random - start) / probability;
+        }
     };
     Choices choose(const FloatPacket &random) const;
 

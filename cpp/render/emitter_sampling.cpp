@@ -49,7 +49,7 @@ FloatPacket choose_face(const EmitterTable &table, uint32_t first_face,
                         const FloatPacket &y, FaceNumbers &faces) {
     const Distribution::Choices choices = table.face_areas.choose(y);
     faces = to_lanes<uint32_t>(choices.index + UIntPacket(first_face));
-    return choices.reused;
+    return choices.reused(y);
 }
 
 // The same face in all lanes.
@@ -140,9 +140,10 @@ PointLight<FloatPacket> light_for(const PointLight<float> &light, const FloatPac
     return lights_in_all_lanes(light);
 }
 
+// In line, or lights would go through memory.
 template <typename Real>
-EmitterSample<Real> from_point(const PointLight<Real> &light, const Real &choice_weight,
-                               const Vec3<Real> &p) {
+[[gnu::always_inline]] inline EmitterSample<Real>
+from_point(const PointLight<Real> &light, const Real &choice_weight, const Vec3<Real> &p) {
     const PointLightSample<Real> point = sample_point_light(light, p);
     const Real factor = point.factor * choice_weight;
     return {by_axis([&](int k) {
@@ -316,7 +317,8 @@ EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x)
         return {UIntPacket(index), FloatPacket(float(count)), scaled - index};
     }
     const Distribution::Choices choices = scene.emitter_choice.choose(x);
-    return {choices.index, FloatPacket(1.0f) / choices.probability, choices.reused};
+    return {choices.index, FloatPacket(1.0f) / choices.probability,
+            scene.all_emitters_are_points ? x : choices.reused(x)};
 }
 
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
@@ -330,6 +332,8 @@ EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 const EmitterChoices &choices,
                                                 LaneBits lanes,
                                                 const Vec3<FloatPacket> &p) {
+    if (scene.few_points)
+        return from_point(lights_of(*scene.few_points, choices.emitter), choices.weight, p);
     const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
     PointLight<FloatPacket> lights = lights_in_all_lanes(scene.emitter_tables[first].point);
     const LaneBits others = lanes & ~to_bits(choices.emitter == UIntPacket(first));

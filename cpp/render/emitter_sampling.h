@@ -32,7 +32,7 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
 struct EmitterChoices {
     UIntPacket emitter;
     FloatPacket weight; // 1 / the probability of the choice
-    FloatPacket x;      // made uniform again
+    FloatPacket x;      // made uniform again; any value if all emitters are points
 };
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x);
 
@@ -48,25 +48,6 @@ EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t em
 EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 const EmitterChoices &choices,
                                                 LaneBits lanes, const Vec3<FloatPacket> &p);
-
-// Calls visit(emitter, lanes, sample) for each emitter that is chosen in some of the given
-// lanes.
-template <typename Visit>
-void for_each_light(const PreparedScene &scene, const EmitterChoices &choices,
-                    LaneBits lanes, const Vec3<FloatPacket> &p, const FloatPacket &y,
-                    Visit &&visit) {
-    if (!scene.all_emitters_are_points) {
-        for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits holders) {
-            visit(emitter, holders, sample_chosen(scene, emitter, choices, p, y));
-        });
-    } else if (lanes != 0) {
-        const EmitterSample<FloatPacket> sample =
-            sample_chosen_points(scene, choices, lanes, p);
-        for_each_value(choices.emitter, lanes, [&](uint32_t emitter, LaneBits holders) {
-            visit(emitter, holders, sample);
-        });
-    }
-}
 
 // Whether the numbers x and y make a difference.
 bool needs_light_numbers(const PreparedScene &scene);

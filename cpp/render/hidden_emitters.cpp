@@ -45,7 +45,8 @@ void TileRenderer::pass_hidden_emitters() {
 
 void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
                                 size_t first) {
-    HitPacket hit;
+    ShadedPacket packet;
+    HitPacket &hit = packet.hit;
     LaneArray<uint32_t> rays, faces, instances;
     LaneArray<float> origin[3], d[3], t;
     // Lanes behind the last ray repeat it.
@@ -73,7 +74,8 @@ void TileRenderer::shade_passed(const PassingRays &passing, const Hits &hits,
     hit.faces = load<UIntPacket>(faces);
     hit.t = load<FloatPacket>(t);
     hit.instances = load<UIntPacket>(instances);
-    shade(hit, surface_of(scene_, faces_, hit, false));
+    packet.point = surface_of(scene_, faces_, hit, false);
+    shade({&packet, 1});
 }
 
 } // namespace mlrt

@@ -8,14 +8,15 @@ SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, FaceCache &cach
                                      const HitPacket &hit, bool common_origin) {
     const LaneBits on_objects = lanes_on_objects(scene, hit.faces, hit.lanes);
     const LaneBits on_meshes = hit.lanes & ~on_objects;
+    const Vec3<FloatPacket> *origin = common_origin ? nullptr : &hit.origin;
+    if (on_objects == 0)
+        return hit_surfaces(cache, origin, hit.direction, hit.faces, on_meshes);
     SurfacePoint<FloatPacket> point{in_all_lanes({}), in_all_lanes({}), in_all_lanes({})};
     if (on_meshes != 0)
-        point = hit_surfaces(cache, common_origin ? nullptr : &hit.origin, hit.direction,
-                             hit.faces, on_meshes);
-    if (on_objects != 0)
-        place_object_surfaces(scene,
-                              {hit.origin, hit.direction, hit.t, hit.faces, hit.instances},
-                              on_objects, point);
+        point = hit_surfaces(cache, origin, hit.direction, hit.faces, on_meshes);
+    place_object_surfaces(scene,
+                          {hit.origin, hit.direction, hit.t, hit.faces, hit.instances},
+                          on_objects, point);
     return point;
 }
 

@@ -41,7 +41,13 @@ SurfacePoint<FloatPacket> surface_of(const PreparedScene &scene, FaceCache &cach
 // The same for robust shadow rays.
 SurfacePlane<DoublePacket> plane_of(const PreparedScene &scene, const HitPacket &hit);
 
-// The shadow ray from the hits to samples of an emitter.
+// The shadow ray from the hits to samples of any emitters, with Mitsuba's offset.
+inline ShadowSegment<FloatPacket> mitsuba_segment(const SurfacePoint<FloatPacket> &point,
+                                                  const EmitterSample<FloatPacket> &light) {
+    return {offset_point(point.p, point.face_normal, light.target - point.p), light.target};
+}
+
+// The same to samples of one emitter.
 inline ShadowSegment<FloatPacket> shadow_segment(const PreparedScene &scene,
                                                  ShadowOffset offset, const HitPacket &hit,
                                                  const SurfacePoint<FloatPacket> &point,
@@ -49,7 +55,7 @@ inline ShadowSegment<FloatPacket> shadow_segment(const PreparedScene &scene,
                                                  const EmitterSample<FloatPacket> &light) {
     if (offset == ShadowOffset::robust)
         return robust_segment<FloatPacket>(scene, plane_of(scene, hit), emitter, light);
-    return {offset_point(point.p, point.face_normal, light.target - point.p), light.target};
+    return mitsuba_segment(point, light);
 }
 
 // Where rays begin that leave the surface in the given directions, or pass through it.

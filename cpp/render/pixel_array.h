@@ -1,28 +1,47 @@
 // Memory for a picture.
 #pragma once
 
+#include "base/simd.h"
+
 #include <cstddef>
 #include <memory>
+#include <new>
+#include <type_traits>
 #include <utility>
 
 namespace mlrt {
 
+struct PixelDelete {
+    template <typename T>
+    void operator()(T *values) const {
+        ::operator delete(values, std::align_val_t(CACHE_LINE));
+    }
+};
+
+template <typename T>
+using Pixels = std::unique_ptr<T[], PixelDelete>;
+
 // A value for each pixel, or several; not written when it is made, which would take as long
-// as to render a small part of the picture.
+// as to render a small part of the picture. Begins with a cache line, so that rows of tiles
+// are whole lines, which can be written past the caches.
 template <typename T>
 class PixelArray {
+    static_assert(std::is_trivially_default_constructible_v<T>);
+
 public:
     PixelArray() = default;
     explicit PixelArray(size_t size)
-        : values_(size > 0 ? std::make_unique_for_overwrite<T[]>(size) : nullptr),
+        : values_(size > 0 ? static_cast<T *>(::operator new(size * sizeof(T),
+                                                             std::align_val_t(CACHE_LINE)))
+                           : nullptr),
           size_(size) {}
 
     T *data() { return values_.get(); }
     size_t size() const { return size_; }
-    std::unique_ptr<T[]> release() { return std::move(values_); }
+    Pixels<T> release() { return std::move(values_); }
 
 private:
-    std::unique_ptr<T[]> values_;
+    Pixels<T> values_;
     size_t size_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // Light from points, `point` and `spot`: of one light, or of sixteen side by side.
 #pragma once
 
+#include "base/look_up.h"
 #include "base/simd.h"
 
 namespace mlrt {
@@ -15,19 +16,19 @@ struct PointLight {
     Real inverse_transition;   // 1 / (cutoff_angle - beam_width)
 };
 
-// Calls visit(of_many, of_one) for each number that makes a light.
-template <typename Visit>
-void for_each_number(PointLight<FloatPacket> &many, const PointLight<float> &one,
+// Calls visit(number, other) for each number that makes a light, and that of another one.
+template <typename Numbers, typename Others, typename Visit>
+void for_each_number(PointLight<Numbers> &light, const PointLight<Others> &other,
                      Visit &&visit) {
     for (int k = 0; k < 3; ++k) {
-        visit(many.position[k], one.position[k]);
-        visit(many.intensity[k], one.intensity[k]);
-        visit(many.axis[k], one.axis[k]);
+        visit(light.position[k], other.position[k]);
+        visit(light.intensity[k], other.intensity[k]);
+        visit(light.axis[k], other.axis[k]);
     }
-    visit(many.cos_cutoff, one.cos_cutoff);
-    visit(many.cos_beam, one.cos_beam);
-    visit(many.cutoff_angle, one.cutoff_angle);
-    visit(many.inverse_transition, one.inverse_transition);
+    visit(light.cos_cutoff, other.cos_cutoff);
+    visit(light.cos_beam, other.cos_beam);
+    visit(light.cutoff_angle, other.cutoff_angle);
+    visit(light.inverse_transition, other.inverse_transition);
 }
 
 inline PointLight<FloatPacket> lights_in_all_lanes(const PointLight<float> &light) {
@@ -43,6 +44,25 @@ inline void set_lanes(PointLight<FloatPacket> &lights, LaneBits lanes,
     for_each_number(lights, light, [&](FloatPacket &many, float one) {
         many = select(mask, FloatPacket(one), many);
     });
+}
+
+// Up to sixteen lights, of which each lane of a packet takes one without a branch.
+using FewPointLights = PointLight<LaneArray<float>>;
+
+inline void set_light(FewPointLights &lights, uint32_t number,
+                      const PointLight<float> &light) {
+    for_each_number(lights, light,
+                    [&](LaneArray<float> &entries, float one) { entries[number] = one; });
+}
+
+inline PointLight<FloatPacket> lights_of(const FewPointLights &lights,
+                                         const UIntPacket &numbers) {
+    PointLight<FloatPacket> chosen;
+    for_each_number(chosen, lights,
+                    [&](FloatPacket &many, const LaneArray<float> &entries) {
+                        many = look_up(entries, numbers);
+                    });
+    return chosen;
 }
 
 // Mitsuba's spot.cpp, falloff_curve: linear in the angle between beam width and cut-off.
@@ -70,8 +90,8 @@ struct PointLightSample {
 };
 
 template <typename Real>
-PointLightSample<Real> sample_point_light(const PointLight<Real> &light,
-                                          const Vec3<Real> &p) {
+[[gnu::always_inline]] inline PointLightSample<Real>
+sample_point_light(const PointLight<Real> &light, const Vec3<Real> &p) {
     const Vec3<Real> to_light = light.position - p;
     const Real squared = dot(to_light, to_light);
     const Real inverse = Real(1.0f) / square_root(squared);

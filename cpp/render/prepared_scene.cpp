@@ -174,6 +174,11 @@ PreparedScene::PreparedScene(SceneData scene_data)
                                    emitter.type == EmitterType::spot ||
                                    emitter.sampling_weight == 0;
     }
+    if (all_emitters_are_points && emitter_tables.size() <= PACKET_WIDTH) {
+        few_points.emplace();
+        for (uint32_t i = 0; i < emitter_tables.size(); ++i)
+            set_light(*few_points, i, emitter_tables[i].point);
+    }
     if (std::any_of(weights.begin(), weights.end(), [](float w) { return w != 1.0f; }))
         emitter_choice = Distribution(weights);
 

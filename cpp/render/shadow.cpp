@@ -49,20 +49,26 @@ void ShadowRays::append(LaneBits lanes, const HitPacket &hit, const Vec3<FloatPa
     if (packet_count_ == packets_.size())
         packets_.resize(std::max<size_t>(PACKET_WIDTH, 2 * packets_.size()));
     Packet &packet = packets_[packet_count_++];
-    for (int k = 0; k < 3; ++k)
-        packet.light[k] = light[k];
+    packet.light = light;
     packet.first = hit.first;
     packet.lanes = lanes;
-    store_compressed(&ray_[count_], hit.ray, lanes);
-    for (int k = 0; k < 3; ++k) {
-        if (!from_light_)
-            store_compressed(&origin_[k][count_], from[k], lanes);
-        const FloatPacket way = parallel_     ? FloatPacket((*parallel_)[k])
-                                : from_light_ ? from[k] - to[k]
-                                              : to[k] - from[k];
-        store_compressed(&direction_[k][count_], way, lanes);
-    }
+    const uint32_t first = count_;
     count_ += uint32_t(std::popcount(lanes));
+    const bool from_light = from_light_;
+    uint32_t *ray = ray_.data() + first;
+    float *const direction[3] = {direction_[0].data() + first, direction_[1].data() + first,
+                                 direction_[2].data() + first};
+    store_compressed(ray, hit.ray, lanes);
+    if (from_light) {
+        for (int k = 0; k < 3; ++k)
+            store_compressed(direction[k], from[k] - to[k], lanes);
+        return;
+    }
+    for (int k = 0; k < 3; ++k) {
+        store_compressed(&origin_[k][first], from[k], lanes);
+        store_compressed(direction[k],
+                         parallel_ ? FloatPacket((*parallel_)[k]) : to[k] - from[k], lanes);
+    }
 }
 
 void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &options,

@@ -1,6 +1,7 @@
 // Shadow rays: which samples of lights are visible.
 #pragma once
 
+#include "base/aligned_vector.h"
 #include "base/counters.h"
 #include "base/simd.h"
 #include "mlrta/trace.h"
@@ -53,11 +54,11 @@ private:
     float begin_, end_;             // of their intervals
     uint32_t count_ = 0;
     // One array a component, with room for a packet behind the last entry.
-    std::vector<uint32_t> ray_;
-    std::vector<float> origin_[3]; // if the rays do not start at the light
-    std::vector<float> direction_[3];
-    std::vector<float> t_min_, t_max_, cost_;
-    std::vector<uint8_t> occluded_;
+    AlignedVector<uint32_t> ray_;
+    AlignedVector<float> origin_[3]; // if the rays do not start at the light
+    AlignedVector<float> direction_[3];
+    AlignedVector<float> t_min_, t_max_, cost_;
+    AlignedVector<uint8_t> occluded_;
     // What was added at once: the lanes have light, and neighbouring entries above.
     struct Packet {
         Vec3<FloatPacket> light;     // any value in other lanes

@@ -2,6 +2,8 @@
 
 #include "render/face_cache.h"
 
+#include <optional>
+
 namespace mlrt {
 
 namespace {
@@ -42,16 +44,29 @@ Real fused_dot(const Vec3<Real> &a, const Vec3<Part> &b) {
     return fused(a.x, Real(b.x), fused(a.y, Real(b.y), a.z * Real(b.z)));
 }
 
+// What the direction of a ray is multiplied by, of a WeightForm, times the direction.
+template <typename Double>
+struct WeightProducts {
+    Double normal, b, c;
+};
+
+template <typename Double, typename Part>
+WeightProducts<Double> products_of(const Vec3<Double> &direction,
+                                   const WeightForm<Part> &form) {
+    return {fused_dot(direction, form.normal), fused_dot(direction, form.b),
+            fused_dot(direction, form.c)};
+}
+
 // As a ray has them that is known to hit; where they are no numbers, some point of the
 // face.
-template <typename Real, typename Part>
-Vec2<Real> weights_of(const Vec3<Real> &direction, const WeightForm<Part> &form) {
+template <typename Real>
+[[gnu::always_inline]] inline Vec2<Real>
+weights_of(const WeightProducts<DoubleOf<Real>> &products) {
     using Double = DoubleOf<Real>;
-    const auto d = to_double(direction);
-    const Double scale = Double(1.0) / fused_dot(d, form.normal);
+    const Double scale = Double(1.0) / products.normal;
     const Real zero(0.0f), one(1.0f);
-    const Real b = maximum(Real(fused_dot(d, form.b) * scale), zero);
-    const Real c = maximum(Real(fused_dot(d, form.c) * scale), zero);
+    const Real b = maximum(Real(products.b * scale), zero);
+    const Real c = maximum(Real(products.c * scale), zero);
     const Real weight_b = minimum(b, one);
     return {weight_b, minimum(c, one - weight_b)};
 }
@@ -71,17 +86,18 @@ Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Part> &n,
 // Mitsuba 3.9's mesh.cpp, compute_surface_interaction. Normals of vertices are zeros where
 // the face normal serves; there need be none if it does everywhere.
 template <typename Real, typename Part>
-SurfacePoint<Real> point_on(const Vec3<Real> &direction, const FaceParts<Part> &face,
-                            const Corners<Part> *normals) {
-    const Vec2<Real> at = weights_of(direction, face.weights);
-    const Vec3<Real> normal(face.normal);
-    return {interpolate(face.corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
-            normals ? interpolated_normal(at, *normals, face.normal) : normal};
+SurfacePoint<Real> point_at(const Vec2<Real> &at, const Corners<Part> &corners,
+                            const Vec3<Part> &face_normal, const Corners<Part> *normals) {
+    const Vec3<Real> normal(face_normal);
+    return {interpolate(corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
+            normals ? interpolated_normal(at, *normals, face_normal) : normal};
 }
 
 template <typename Real>
 SurfacePoint<Real> point_on(const Vec3<Real> &direction, const HitFace &face) {
-    return point_on(direction, face.parts, face.vertex_normals ? &face.normals : nullptr);
+    return point_at(weights_of<Real>(products_of(to_double(direction), face.parts.weights)),
+                    face.parts.corners, face.parts.normal,
+                    face.vertex_normals ? &face.normals : nullptr);
 }
 
 // Sets the given lanes.
@@ -105,34 +121,86 @@ Corners<FloatPacket> corners_in_all_lanes(const Corners<float> &corners) {
     return {in_all_lanes(corners.a), in_all_lanes(corners.b), in_all_lanes(corners.c)};
 }
 
-// The faces of sixteen rays.
-struct FaceLanes {
-    FaceParts<FloatPacket> parts;
-    Corners<FloatPacket> normals;
-    bool vertex_normals; // whether any has them
+void place(DoublePacket &values, LaneBits lanes, const DoublePacket &others) {
+    values = select(from_bits<DoublePacket>(lanes), others, values);
+}
 
+// The faces of sixteen rays from the origin of the cache.
+class FaceLanes {
+public:
     // All lanes take the first face.
-    explicit FaceLanes(const HitFace &face)
-        : parts{corners_in_all_lanes(face.parts.corners),
-                in_all_lanes(face.parts.normal),
-                {Vec3<DoublePacket>(face.parts.weights.normal),
-                 Vec3<DoublePacket>(face.parts.weights.b),
-                 Vec3<DoublePacket>(face.parts.weights.c)}},
-          normals(corners_in_all_lanes(face.normals)), vertex_normals(face.vertex_normals) {
+    FaceLanes(const Vec3<FloatPacket> &direction, const HitFace &face)
+        : direction_(to_double(direction)),
+          corners_(corners_in_all_lanes(face.parts.corners)),
+          normal_(in_all_lanes(face.parts.normal)),
+          products_(products_of(direction_, face.parts.weights)) {
+        if (face.vertex_normals)
+            normals_ = corners_in_all_lanes(face.normals);
     }
 
     void set(LaneBits lanes, const HitFace &face) {
-        place(parts.corners, lanes, face.parts.corners);
-        place(parts.normal, lanes, face.parts.normal);
-        place(parts.weights.normal, lanes, face.parts.weights.normal);
-        place(parts.weights.b, lanes, face.parts.weights.b);
-        place(parts.weights.c, lanes, face.parts.weights.c);
-        if (!vertex_normals && !face.vertex_normals)
-            return;
-        vertex_normals = true;
-        place(normals, lanes, face.normals);
+        place(corners_, lanes, face.parts.corners);
+        place(normal_, lanes, face.parts.normal);
+        // Products take less room than what they are made of.
+        const auto products = products_of(direction_, face.parts.weights);
+        place(products_.normal, lanes, products.normal);
+        place(products_.b, lanes, products.b);
+        place(products_.c, lanes, products.c);
+        if (face.vertex_normals && !normals_)
+            normals_ = corners_in_all_lanes({});
+        if (normals_)
+            place(*normals_, lanes, face.normals);
     }
+
+    // If the rays begin elsewhere, with what belongs to the lanes' faces there.
+    void start_at(const Vec3<FloatPacket> &origin, const Vec3<DoublePacket> &edge_b,
+                  const Vec3<DoublePacket> &edge_c) {
+        const Vec3<DoublePacket> way = to_double(origin) - to_double(corners_.a);
+        products_.b = fused_dot(direction_, cross(way, edge_c));
+        products_.c = fused_dot(direction_, cross(edge_b, way));
+    }
+
+    SurfacePoint<FloatPacket> points() const {
+        return point_at(weights_of<FloatPacket>(products_), corners_, normal_,
+                        normals_ ? &*normals_ : nullptr);
+    }
+
+private:
+    Vec3<DoublePacket> direction_;
+    Corners<FloatPacket> corners_;
+    Vec3<FloatPacket> normal_;
+    WeightProducts<DoublePacket> products_;
+    std::optional<Corners<FloatPacket>> normals_; // of the vertices, if any face has them
 };
+
+// All lanes are on the first face but for the others, which are on several.
+[[gnu::noinline]] SurfacePoint<FloatPacket>
+points_on_faces(FaceCache &cache, const Vec3<FloatPacket> &direction,
+                const UIntPacket &faces, uint32_t first, LaneBits others) {
+    FaceLanes met(direction, cache.of(first));
+    for_each_value(faces, others, [&](uint32_t number, LaneBits holders) {
+        met.set(holders, cache.of(number));
+    });
+    return met.points();
+}
+
+// The same of rays with origins of their own.
+[[gnu::noinline]] SurfacePoint<FloatPacket>
+points_of_rays(FaceCache &cache, const Vec3<FloatPacket> &origin,
+               const Vec3<FloatPacket> &direction, const UIntPacket &faces, uint32_t first,
+               LaneBits others) {
+    const HitFace &first_face = cache.of(first);
+    FaceLanes met(direction, first_face);
+    Vec3<DoublePacket> edge_b(first_face.edge_b), edge_c(first_face.edge_c);
+    for_each_value(faces, others, [&](uint32_t number, LaneBits holders) {
+        const HitFace &face = cache.of(number);
+        met.set(holders, face);
+        place(edge_b, holders, face.edge_b);
+        place(edge_c, holders, face.edge_c);
+    });
+    met.start_at(origin, edge_b, edge_c);
+    return met.points();
+}
 
 } // namespace
 
@@ -180,28 +248,11 @@ SurfacePoint<FloatPacket> hit_surfaces(FaceCache &cache, const Vec3<FloatPacket>
                                        const UIntPacket &faces, LaneBits lanes) {
     const uint32_t first = lane_of(faces, uint32_t(__builtin_ctz(lanes)));
     const LaneBits others = lanes & ~to_bits(faces == UIntPacket(first));
-    if (others == 0 && !origin)
+    if (origin)
+        return points_of_rays(cache, *origin, direction, faces, first, others);
+    if (others == 0)
         return point_on(direction, cache.of(first));
-    FaceLanes met(cache.of(first));
-    Vec3<DoublePacket> edge_b, edge_c;
-    if (origin) {
-        edge_b = Vec3<DoublePacket>(cache.of(first).edge_b);
-        edge_c = Vec3<DoublePacket>(cache.of(first).edge_c);
-    }
-    for_each_value(faces, others, [&](uint32_t number, LaneBits holders) {
-        const HitFace &face = cache.of(number);
-        met.set(holders, face);
-        if (origin) {
-            place(edge_b, holders, face.edge_b);
-            place(edge_c, holders, face.edge_c);
-        }
-    });
-    if (origin) {
-        const Vec3<DoublePacket> way = to_double(*origin) - to_double(met.parts.corners.a);
-        met.parts.weights.b = cross(way, edge_c);
-        met.parts.weights.c = cross(edge_b, way);
-    }
-    return point_on(direction, met.parts, met.vertex_normals ? &met.normals : nullptr);
+    return points_on_faces(cache, direction, faces, first, others);
 }
 
 } // namespace mlrt

@@ -4,43 +4,13 @@
 #include "render/emitter_density.h"
 #include "render/emitter_sampling.h"
 #include "render/textured_light.h"
-#include "render/textured_material.h"
 
 #include <algorithm>
 #include <array>
+#include <new>
 #include <numbers>
 
 namespace mlrt {
-
-namespace {
-
-UIntPacket shapes_of(const PreparedScene &scene, const UIntPacket &faces, LaneBits lanes) {
-    UIntPacket shapes(NONE);
-    for_each_value(faces, lanes, [&](uint32_t face, LaneBits holders) {
-        shapes = select(from_bits<UIntPacket>(holders),
-                        UIntPacket(scene.shape_of_face[face]), shapes);
-    });
-    return shapes;
-}
-
-// What the sides that the rays see reflect; black in other lanes.
-Vec3<FloatPacket> albedo_of(const PreparedScene &scene, const UIntPacket &shapes,
-                            LaneBits lanes, LaneBits seen_from_front) {
-    Vec3<FloatPacket> albedo = in_all_lanes({});
-    const auto set = [&](LaneBits side, Vec3f colour) {
-        const auto mask = from_bits<FloatPacket>(side);
-        for (int k = 0; k < 3 && side != 0; ++k)
-            albedo[k] = select(mask, FloatPacket(colour[k]), albedo[k]);
-    };
-    for_each_value(shapes, lanes, [&](uint32_t shape, LaneBits holders) {
-        const Material &material = scene.shape_materials[shape];
-        set(holders & seen_from_front, material.front);
-        set(holders & ~seen_from_front, material.back);
-    });
-    return albedo;
-}
-
-} // namespace
 
 TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
                            const Sampling &sampling, const TraceOptions &options,
@@ -69,6 +39,8 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
     }
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);
+    for (ShadedPacket &packet : packets_)
+        packet.hit.origin = in_all_lanes(scene.plane.origin);
 }
 
 void TileRenderer::render(const PixelGroup &group) {
@@ -92,7 +64,7 @@ void TileRenderer::make_room() {
     if (scene_.data.objects)
         instance_.resize(padded, NO_INSTANCE);
     values_.resize(target_.channels.count);
-    for (std::vector<float> &channel : values_)
+    for (AlignedVector<float> &channel : values_)
         channel.assign(padded, 0.0f);
     if (target_.cost)
         cost_.assign(padded, 0.0f);
@@ -156,30 +128,40 @@ void TileRenderer::add_background() {
     }
 }
 
+// Packets take each step of shading one after the other: a step is a chain of operations
+// that wait for each other, of which a processor works on several only if they are short.
 void TileRenderer::shade_hits() {
-    HitPacket hit;
-    hit.origin = in_all_lanes(scene_.plane.origin);
     const bool common_origin = scene_.plane.has_common_origin();
-    const UIntPacket lane_number(lane_numbers());
-    for (size_t first = 0; first < samples_.count(); first += PACKET_WIDTH) {
-        hit.faces = load<UIntPacket>(&primitive_[first]);
-        hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
-        if (hit.lanes == 0)
-            continue;
-        hit.ray = UIntPacket(uint32_t(first)) + lane_number;
-        for (int k = 0; k < 3; ++k)
-            hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
-        for (int k = 0; k < 3 && !common_origin; ++k)
-            hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
-        hit.first = first;
-        if (scene_.data.objects) {
-            hit.t = load<FloatPacket>(&t_[first]);
-            hit.instances = load<UIntPacket>(&instance_[first]);
+    const size_t at_once = packets_.size() * PACKET_WIDTH;
+    for (size_t begin = 0; begin < samples_.count(); begin += at_once) {
+        const size_t end = std::min(begin + at_once, samples_.count());
+        size_t count = 0;
+        for (size_t first = begin; first < end; first += PACKET_WIDTH) {
+            ShadedPacket &packet = packets_[count];
+            HitPacket &hit = packet.hit;
+            hit.faces = load<UIntPacket>(&primitive_[first]);
+            hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
+            if (hit.lanes == 0)
+                continue;
+            ++count;
+            hit.ray = UIntPacket(uint32_t(first)) + lane_indices();
+            for (int k = 0; k < 3; ++k)
+                hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
+            for (int k = 0; k < 3 && !common_origin; ++k)
+                hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
+            hit.first = first;
+            if (scene_.data.objects) {
+                hit.t = load<FloatPacket>(&t_[first]);
+                hit.instances = load<UIntPacket>(&instance_[first]);
+            }
+            // Made in place: an assignment would copy it.
+            new (&packet.point)
+                SurfacePoint<FloatPacket>(surface_of(scene_, faces_, hit, common_origin));
         }
-        const SurfacePoint<FloatPacket> point =
-            surface_of(scene_, faces_, hit, common_origin);
-        write_depth_and_normal(hit, point, first);
-        shade(hit, point);
+        const std::span packets = std::span(packets_).first(count);
+        for (const ShadedPacket &packet : packets)
+            write_depth_and_normal(packet.hit, packet.point, *packet.hit.first);
+        shade(packets);
     }
 }
 
@@ -198,64 +180,6 @@ void TileRenderer::write_depth_and_normal(const HitPacket &hit,
                 length(hit.direction));
     for (int k = 0; k < 3 && channels.normal >= 0; ++k)
         set(channels.normal + k, point.shading_normal[k]);
-}
-
-// Mitsuba's direct.cpp, for BSDF samples see bsdf_light.cpp: light that the surface emits,
-// and shadow rays for light that it reflects. A ray that contributes nothing, however its
-// shadow ray fares, is left out as soon as that is known.
-void TileRenderer::shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point) {
-    const FloatPacket zero(0.0f);
-    // Only its sign matters, so the direction need not have unit length.
-    const FloatPacket cos_view = -dot(hit.direction, point.shading_normal);
-    const LaneBits seen_from_front = to_bits(cos_view > zero);
-    const UIntPacket shapes = shapes_of(scene_, hit.faces, hit.lanes);
-
-    LaneBits lanes =
-        add_emission(hit, point, shapes, seen_from_front) & to_bits(cos_view != zero);
-    Vec3<FloatPacket> albedo = albedo_of(scene_, shapes, lanes, seen_from_front);
-    if (bsdf_rays_) {
-        shade_in_both_ways(hit, point, shapes, lanes, cos_view, albedo);
-        return;
-    }
-    if (lanes & scene_.textured_faces.lanes_of(hit.faces))
-        albedo = textured_albedo(
-            scene_, {hit.origin, hit.direction, hit.faces, shapes, hit.t, hit.instances},
-            lanes, seen_from_front, albedo);
-    lanes &= not_black(albedo);
-    if (lanes == 0 || shadows_.empty())
-        return;
-    for (uint32_t sample = 0; sample < emitter_samples_; ++sample)
-        add_emitter_sample(hit, point, lanes, cos_view, albedo, sample);
-}
-
-void TileRenderer::add_emitter_sample(const HitPacket &hit,
-                                      const SurfacePoint<FloatPacket> &point,
-                                      LaneBits lanes, const FloatPacket &cos_view,
-                                      const Vec3<FloatPacket> &albedo, uint32_t sample) {
-    const FloatPacket x = of_rays(hit, samples_.light_x(sample));
-    const FloatPacket y = of_rays(hit, samples_.light_y(sample));
-    const EmitterChoices choices = choose_emitters(scene_, x);
-    for_each_light(
-        scene_, choices, lanes, point.p, y,
-        [&](uint32_t emitter, LaneBits lit, const EmitterSample<FloatPacket> &light) {
-            add_light(hit, point, lit, cos_view, albedo, emitter, light);
-        });
-}
-
-void TileRenderer::add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                             LaneBits lanes, const FloatPacket &cos_view,
-                             const Vec3<FloatPacket> &albedo, uint32_t emitter,
-                             const EmitterSample<FloatPacket> &light) {
-    const FloatPacket zero(0.0f), cosine = dot(light.direction, point.shading_normal);
-    const FloatPacket cos_light = select(cos_view > zero, cosine, -cosine);
-    lanes &= not_black(light.weight) & to_bits(cos_light > zero);
-    if (lanes == 0)
-        return;
-    const ShadowSegment<FloatPacket> segment =
-        shadow_segment(scene_, offset_, hit, point, emitter, light);
-    const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-    shadows_[emitter].append(lanes, hit, segment.start, segment.target,
-                             (albedo * share) * light.weight);
 }
 
 // Adds what surfaces emit towards the camera. Returns the lanes to be shaded; those that
@@ -318,8 +242,8 @@ void TileRenderer::add_moments() {
                                  {0.019334f, 0.119193f, 0.950227f}};
     const int first = target_.channels.moment;
     for (int k = 0; k < 3 && first >= 0; ++k) {
-        std::vector<float> &mean = values_[size_t(first + k)];
-        std::vector<float> &square = values_[size_t(first + 3 + k)];
+        AlignedVector<float> &mean = values_[size_t(first + k)];
+        AlignedVector<float> &square = values_[size_t(first + 3 + k)];
         for (size_t ray = 0; ray < samples_.count(); ++ray) {
             mean[ray] =
                 dot(TO_XYZ[k], Vec3f{values_[0][ray], values_[1][ray], values_[2][ray]});
@@ -331,7 +255,7 @@ void TileRenderer::add_moments() {
 void TileRenderer::write(const PixelGroup &group) {
     add_moments();
     std::vector<const float *> values;
-    for (const std::vector<float> &channel : values_)
+    for (const AlignedVector<float> &channel : values_)
         values.push_back(channel.data());
     target_.film.add(group, samples_.film_x(), samples_.film_y(), values.data());
 

@@ -3,10 +3,12 @@
 // cache.
 #pragma once
 
+#include "base/aligned_vector.h"
 #include "base/counters.h"
 #include "mlrta/trace.h"
 #include "render/bsdf_rays.h"
 #include "render/camera_samples.h"
+#include "render/emitter_sampling.h"
 #include "render/face_cache.h"
 #include "render/hit_packet.h"
 #include "render/picture_film.h"
@@ -17,8 +19,10 @@
 #include "render/shadow_offset.h"
 #include "render/spread_samples.h"
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 namespace mlrt {
@@ -71,6 +75,17 @@ struct Sampling {
     uint32_t bsdf_samples = 0;
 };
 
+// A packet on its way from surfaces to shadow rays.
+struct ShadedPacket {
+    HitPacket hit;
+    SurfacePoint<FloatPacket> point;
+    LaneBits lanes = 0; // that reflect light
+    FloatPacket cos_view;
+    Vec3<FloatPacket> albedo;
+    EmitterChoices choices;
+    EmitterSample<FloatPacket> light; // if all emitters are points
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
@@ -87,8 +102,8 @@ public:
 private:
     // Camera rays that go on behind an emitter that is to be hidden.
     struct PassingRays {
-        std::vector<uint32_t> ray;
-        std::vector<float> origin[3];
+        AlignedVector<uint32_t> ray;
+        AlignedVector<float> origin[3];
     };
 
     void make_room();
@@ -97,14 +112,13 @@ private:
     void shade_hits();
     void write_depth_and_normal(const HitPacket &hit,
                                 const SurfacePoint<FloatPacket> &point, size_t first);
-    void shade(const HitPacket &hit, const SurfacePoint<FloatPacket> &point);
-    void add_emitter_sample(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                            LaneBits lanes, const FloatPacket &cos_view,
-                            const Vec3<FloatPacket> &albedo, uint32_t sample);
-    void add_light(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
-                   LaneBits lanes, const FloatPacket &cos_view,
-                   const Vec3<FloatPacket> &albedo, uint32_t emitter,
-                   const EmitterSample<FloatPacket> &light);
+    // In emitter_light.cpp: packets of which hits and points are known.
+    void shade(std::span<ShadedPacket> packets);
+    void find_reflectance(ShadedPacket &packet);
+    void choose_light(ShadedPacket &packet, uint32_t sample);
+    void add_emitter_sample(const ShadedPacket &packet, uint32_t sample);
+    void add_light(const ShadedPacket &packet, LaneBits lanes,
+                   const EmitterSample<FloatPacket> &light, const UIntPacket &emitters);
     // In bsdf_light.cpp.
     void shade_in_both_ways(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             const UIntPacket &shapes, LaneBits lanes,
@@ -117,8 +131,8 @@ private:
     void pass_hidden_emitters(); // in hidden_emitters.cpp
     // What rays hit, by ray; distances and instances only if they are wanted.
     struct Hits {
-        std::vector<float> t;
-        std::vector<uint32_t> primitive, instance;
+        AlignedVector<float> t;
+        AlignedVector<uint32_t> primitive, instance;
     };
     void trace(const RayGroup &rays, const CameraTile *tile, float *t, uint32_t *primitive,
                uint32_t *instance);
@@ -140,17 +154,18 @@ private:
     CameraSamples samples_;
 
     // One entry a ray, as in samples_; what lies behind the last ray hits nothing.
-    std::vector<float> t_; // if the depth is wanted, or the scene has objects
-    std::vector<uint32_t> primitive_;
-    std::vector<uint32_t> instance_;         // if the scene has objects
-    std::vector<float> cost_;                // if it is wanted
-    std::vector<std::vector<float>> values_; // by channel of the film
+    AlignedVector<float> t_; // if the depth is wanted, or the scene has objects
+    AlignedVector<uint32_t> primitive_;
+    AlignedVector<uint32_t> instance_;         // if the scene has objects
+    AlignedVector<float> cost_;                // if it is wanted
+    std::vector<AlignedVector<float>> values_; // by channel of the film
 
     std::vector<ShadowRays> shadows_; // one an emitter
     SampleShares shares_;
     uint32_t bsdf_samples_;
     std::optional<BsdfRays> bsdf_rays_; // if there are BSDF samples
     PassingRays passing_;
+    std::array<ShadedPacket, 4> packets_; // that are shaded at once; as many are chosen
 };
 
 } // namespace mlrt

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
+from exact_volumes import lanes, volumes
 from tracing import BRUTE_FORCE, Options, build, closest, each_core, interval, occluded
 
 SEED = 20261127
@@ -40,10 +41,6 @@ def triangles_ahead(rng: np.random.Generator, directions: FloatArray) -> FloatAr
                 corners[2] += rng.uniform(-1e-4, 1e-4, 3) * size
             found.append(corners)
     return np.asarray(found, np.float32)
-
-
-def lanes(bits: int) -> list[int]:
-    return [lane for lane in range(16) if bits >> lane & 1]
 
 
 class ExactBeam:
@@ -86,31 +83,6 @@ def test_rectangles_hold_all_rays(core: ModuleType, spread: float) -> None:
             packet_p, packet_q, packet_half_p, packet_half_q = box
             assert abs(p - packet_p) <= packet_half_p, (SEED, ray)
             assert abs(q - packet_q) <= packet_half_q, (SEED, ray)
-
-
-def volumes(
-    origin: FloatArray, direction: FloatArray, triangle: FloatArray
-) -> tuple[list[Fraction], Fraction, Fraction]:
-    """U, V, W of a ray, N.d, and a.N, exactly."""
-
-    def point(values: npt.ArrayLike) -> list[Fraction]:
-        return [Fraction(float(x)) for x in np.asarray(values)]
-
-    def minus(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
-        return [x - y for x, y in zip(p, q, strict=True)]
-
-    def cross(p: list[Fraction], q: list[Fraction]) -> list[Fraction]:
-        return [p[(k + 1) % 3] * q[(k + 2) % 3] - p[(k + 2) % 3] * q[(k + 1) % 3]
-                for k in range(3)]  # fmt: skip
-
-    def dot(p: list[Fraction], q: list[Fraction]) -> Fraction:
-        return sum((x * y for x, y in zip(p, q, strict=True)), Fraction(0))
-
-    o, d = point(origin), point(direction)
-    a, b, c = (minus(point(corner), o) for corner in triangle)
-    normal = cross(minus(b, a), minus(c, a))
-    edges = [dot(d, cross(b, c)), dot(d, cross(c, a)), dot(d, cross(a, b))]
-    return edges, dot(normal, d), dot(a, normal)
 
 
 @each_core

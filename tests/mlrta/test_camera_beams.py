@@ -112,7 +112,6 @@ def test_the_film_bounds_all_rays(core: ModuleType, samples: int) -> None:
 def assert_bounds(
     told: Any, tile: Tile, first: int, count: int, t_min: float, t_max: float
 ) -> None:
-    center_u, center_v, c, s, half_p, half_q = map(Fraction, told["rectangle"])
     lo_u, hi_u, lo_v, hi_v = map(Fraction, told["slopes"])
     assert [packet["first_ray"] for packet in told["packets"]] == list(
         range(first, first + count, 16)
@@ -122,19 +121,84 @@ def assert_bounds(
         assert packet["active"] == 0xFFFF and packet["strays"] == 0
         u, v, main = exact_slopes(told, tile.directions[ray])
         assert lo_u <= u <= hi_u and lo_v <= v <= hi_v, (SEED, ray)
-        du, dv = u - center_u, v - center_v
-        # The sides need not have unit length: coordinates by Cramer's rule.
-        p = (du * c + dv * s) / (c * c + s * s)
-        q = (dv * c - du * s) / (c * c + s * s)
-        assert abs(p) <= half_p and abs(q) <= half_q, (SEED, ray)
-        for box in (packet["box"], packet["box_of_run"]):
-            box_p, box_q, box_half_p, box_half_q = map(Fraction, box)
-            assert abs(p - box_p) <= box_half_p and abs(q - box_q) <= box_half_q, SEED
+        assert_in_boxes(told, packet, u, v)
         least, greatest = map(Fraction, packet["reciprocal_depths"])
         at_end = 0 if t_max == np.inf else 1 / (Fraction(t_max) * main)
         assert least <= at_end <= greatest, (SEED, ray)
         # What lies nearer than that lies before t_min; told of every ray.
         assert Fraction(told["nearest"]) * Fraction(t_min) * main <= 1
+
+
+def assert_in_boxes(told: Any, packet: Any, u: Fraction, v: Fraction) -> None:
+    """That a ray of a packet lies in the rectangle and in the boxes around it."""
+    center_u, center_v, c, s, half_p, half_q = map(Fraction, told["rectangle"])
+    du, dv = u - center_u, v - center_v
+    # The sides need not have unit length: coordinates by Cramer's rule.
+    p = (du * c + dv * s) / (c * c + s * s)
+    q = (dv * c - du * s) / (c * c + s * s)
+    assert abs(p) <= half_p and abs(q) <= half_q, SEED
+    for box in (packet["box"], packet["box_of_run"]):
+        box_p, box_q, box_half_p, box_half_q = map(Fraction, box)
+        assert abs(p - box_p) <= box_half_p and abs(q - box_q) <= box_half_q, SEED
+
+
+@each_core
+def test_beams_of_a_tiny_camera_map_are_turned_as_any_other(core: ModuleType) -> None:
+    """Its squares underflow. Three samples a pixel leave bounds by the film out."""
+    rng = np.random.default_rng([SEED, 7])
+    turned = 0
+    for _ in range(12):
+        tile = random_tile(rng, 3, 8)
+        size = np.float32(0.9 * 2.0**-59 / np.abs(tile.directions).max())
+        rows = [tuple(float(np.float32(x) * size) for x in row) for row in tile.map]
+        tiny = Tile(tile.origin, rows, tile.square, np.float32(tile.directions * size))
+        told = beam_of(core, tiny, 0, tiny.count, 0, np.inf).describe()
+        assert not told["is_by_film"]
+        if any(packet["strays"] for packet in told["packets"]):
+            continue
+        cosine, sine = told["rectangle"][2:4]
+        assert abs(cosine * cosine + sine * sine - 1) < 4 * 2.0**-24, SEED
+        for ray in range(tiny.count):
+            u, v, _ = exact_slopes(told, tiny.directions[ray])
+            assert_in_boxes(told, told["packets"][ray // 16], u, v)
+        turned += 1
+    assert turned > 6, SEED
+
+
+@each_core
+def test_the_greatest_sum_holds_in_all_boxes(core: ModuleType) -> None:
+    """Of a film that is seen at a slant, boxes reach beyond the rectangle."""
+    base, dx, dy = (0.0, 0.0, 0.05), (0.06, 0.0, 0.06), (0.0, 0.001, 0.0)
+    square = (0, 0, 16, 1, 0.0, 1.0)
+    code = np.arange(256)
+    column = sum((code >> 2 * bit & 1) << bit for bit in range(4))
+    row = sum((code >> 2 * bit + 1 & 1) << bit for bit in range(4))
+    x, y = np.float32(column + 0.5)[:, None], np.float32(row + 0.5)[:, None]
+    directions = (np.float32(base) + x * np.float32(dx)) + y * np.float32(dy)
+    tile = Tile((0.0, 0.0, 0.0), [base, dx, dy], square, directions)
+    told = beam_of(core, tile, 0, 256, 0, np.inf).describe()
+    assert told["is_by_film"]
+    center_u, center_v, _, _, half_p, half_q = told["rectangle"]
+    beyond = 0
+    for packet in told["packets"]:
+        for p, q, box_half_p, box_half_q in (packet["box"], packet["box_of_run"]):
+            reach_p, reach_q = abs(p) + box_half_p, abs(q) + box_half_q
+            beyond += reach_p > 1.5 * half_p or reach_q > 1.5 * half_q
+            greatest = 1 + abs(center_u) + abs(center_v) + np.sqrt(2) * (reach_p + reach_q)
+            assert greatest <= told["greatest_sum"]
+    assert beyond > 0
+
+
+@each_core
+def test_a_tile_without_rays_has_no_hits(core: ModuleType) -> None:
+    tree = build(core, (np.eye(3, dtype=np.float32), np.int32([[0, 1, 2]])))
+    rows = [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    none = np.zeros((0, 3), np.float32)
+    for way in WAYS:
+        t, face, _ = core.beam_leaf_selftest.trace_tile(
+            tree, (0.0, 0.0, 0.0), none, rows, (0, 0, 1, 1, 0.0, 1.0), 0.0, np.inf, way
+        )
+        assert len(t) == 0 and len(face) == 0
 
 
 @each_core

@@ -69,6 +69,29 @@ def test_picture_does_not_depend_on_options(folder: Path, name: str) -> None:
     assert len(set(pictures.values())) == 1
 
 
+@pytest.mark.parametrize("name", ["several", "gaussian border", "crop", "mirrored sky"])
+@pytest.mark.parametrize("samples", [1, 4, 16])
+def test_beams_bounded_by_the_film_leave_the_picture_as_it_is(
+    folder: Path, name: str, samples: int
+) -> None:
+    """They are made for powers of two of samples; the near plane cuts the scene."""
+    description = render_scenes.SCENES[name](folder)
+    description["sensor"]["near_clip"] = 3.9
+    scene = core_scene(description)
+    pictures = set()
+    for traversal, entry_points in (
+        ("brute_force", False),
+        ("beam_leaf", False),
+        ("beam_leaf", True),
+        ("adaptive", True),
+    ):
+        options = {"traversal": traversal, "entry_points": entry_points}
+        answer = core.render(scene, samples, 1, options, AOVS)
+        assert (answer["counters"]["primary_beams"] > 0) == (traversal != "brute_force")
+        pictures.add(all_pictures(answer))
+    assert len(pictures) == 1
+
+
 def test_pictures_depend_on_the_seed(folder: Path) -> None:
     scene = core_scene(render_scenes.SCENES["rectangle"](folder))
     first, again, other = (core.render(scene, 2, seed)["image"] for seed in (4, 4, 5))

@@ -1,0 +1,35 @@
+// Reciprocals that are not divided for, nor the same on all processors.
+//
+// Their last digits depend on the processor, so results may be made of them only if they
+// are certified: the digits that are kept are known by a bound on the error, or else found
+// by true division or exactly. What is kept does not tell then which estimate it came from.
+#pragma once
+
+#include "base/fused_difference.h"
+#include "base/simd.h"
+
+namespace mlrt {
+
+// The error of an estimate, relative to 1 / a, is less.
+inline constexpr float RECIPROCAL_ESTIMATE_ERROR = 0x1p-22f;
+
+// About 1 / a, of numbers from 2^-120 to 2^120 in size. It is not finite, or not a number,
+// for zero and for what is not finite, except that it may be zero for infinity.
+//
+// What the processor has is good to 2^-14 or to 1.5 2^-12, and one step of Newton's method
+// squares that, with a rounding of what it adds and one of the sum.
+inline FloatPacket reciprocal_estimate(const FloatPacket &a) {
+#if defined(__AVX512F__)
+    const FloatPacket rough(_mm512_rcp14_ps(a.m));
+#elif defined(__AVX__)
+    using Half = std::decay_t<decltype(drjit::low(a))>;
+    const FloatPacket rough(Half(_mm256_rcp_ps(drjit::low(a).m)),
+                            Half(_mm256_rcp_ps(drjit::high(a).m)));
+#else
+    const FloatPacket rough = 1.0f / a;
+#endif
+    const FloatPacket left = fused_difference(a, rough, FloatPacket(1.0f));
+    return fused(rough, left, rough);
+}
+
+} // namespace mlrt
