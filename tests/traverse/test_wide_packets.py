@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import ModuleType
 
 import numpy as np
@@ -87,6 +88,50 @@ def test_same_hits_in_huge_and_tiny_scenes(core: ModuleType, power: int) -> None
     vertices, faces = workloads.soup(rng, 200, 0.4)
     scene = (vertices * np.float32(2.0**power)).astype(np.float32), faces
     assert assert_brute_force(rng, core, scene, 200) > 100, SEED
+
+
+def layers(rng: np.random.Generator) -> Scene:
+    """Copies of some triangles, a few roundings nearer or farther along the rays from the
+    origin, in any order: which one is nearest cannot be told in single precision."""
+    middle = rng.normal(size=(8, 1, 3)) * 10 ** rng.uniform(-2, 2, (8, 1, 1))
+    size = np.linalg.norm(middle, axis=2, keepdims=True)
+    corners = middle + size * rng.normal(size=(8, 3, 3)) * 0.2
+    nearer = 1 + 2.0**-24 * rng.integers(-24, 25, (12, 8, 1, 1))
+    copies = (corners * nearer).reshape(-1, 3, 3)
+    vertices = rng.permutation(copies).reshape(-1, 3).astype(np.float32)
+    return vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+
+
+def nested(rng: np.random.Generator) -> Scene:
+    """Triangles that shrink towards a corner, and many equal ones there: a deep tree and a
+    large leaf."""
+    shrunk = rng.uniform(0, 1, (240, 3, 3)) * 1.2 ** -np.arange(240.0)[:, None, None]
+    corners = np.concatenate([shrunk, np.repeat(shrunk[120:121], 300, axis=0)])
+    vertices = corners.reshape(-1, 3).astype(np.float32)
+    return vertices, np.arange(len(vertices), dtype=np.uint32).reshape(-1, 3)
+
+
+@each_core
+@pytest.mark.parametrize("make", [layers, nested])
+def test_same_hits_from_where_triangles_crowd(
+    core: ModuleType, make: Callable[[np.random.Generator], Scene]
+) -> None:
+    rng = np.random.default_rng(SEED)
+    for _ in range(4):
+        scene = make(rng)
+        tree = build(core, scene)
+        tree.widen()
+        rays = rays_from(rng, scene, np.zeros(3, np.float32), 300)
+        rays[1][...] *= np.float32(2.0) ** rng.integers(-15, 16, (300, 1))
+        first = closest(tree, rays, BRUTE_FORCE)
+        assert (first.face >= 0).sum() > 100, SEED
+        t = np.where(first.face < 0, np.float32(1), first.t)
+        for t_min, t_max in ((0, np.inf), (t, np.inf), (0, t), (t * (1 - 2e-6), np.inf)):
+            expected = closest(tree, rays, BRUTE_FORCE, t_min, t_max)
+            for options in (WIDE, ADAPTIVE):
+                closest(tree, rays, options, t_min, t_max).assert_same(expected)
+                hit = occluded(tree, rays, options, t_min, t_max)
+                np.testing.assert_array_equal(hit, expected.face >= 0, f"seed {SEED}")
 
 
 def dense(rng: np.random.Generator) -> tuple[Scene, Rays]:
