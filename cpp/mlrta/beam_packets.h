@@ -26,6 +26,8 @@
 
 namespace mlrt {
 
+class FilmSlopes;
+
 // A rectangle of slopes, turned by an angle: the points center + p (cosine, sine) +
 // q (-sine, cosine) with |p| <= half_p and |q| <= half_q.
 struct SlopeRectangle {
@@ -201,6 +203,9 @@ private:
     void load_camera_packet(const RayGroup &rays, uint32_t number);
     void set_ends(BeamPacket &packet, const FloatPacket &t_max,
                   const FloatPacket &main) const;
+    void fit_to_film(const CameraTile &tile, uint32_t first, const FilmSlopes &slopes);
+    void set_middles(const CameraTile &tile, uint32_t first_of_run,
+                     const FilmRectangle &packet, LaneBits there, Run &run) const;
     void set_camera_ends(float t_min, float t_max, const Range &main);
     void load_around(uint32_t middle, const RayGroup &rays, uint32_t first,
                      uint32_t ray_count);
