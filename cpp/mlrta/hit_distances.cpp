@@ -22,7 +22,7 @@ constexpr float SMALLEST_NORMAL = 0x1p-38f, LARGEST_NORMAL = 0x1p38f;
 
 // Bounds on the error of a distance 1 / (h + l).d, relative to it, see rounded(). With u
 // the unit roundoff, P the sum of the |h_i| times the greatest |d_i|, and m >= 1 the ratio
-// of P and |(h + l).d|, as long as m is at most 2^8:
+// of P and |(h + l).d|, as long as m is less than 171:
 //
 // The sums that start from an anchor of 4 P lie within 5/4 of it, and are each rounded by
 // at most 5.1 u P. What they lose is that exactly, but for a rounding of 5.1 u^2 P; with
@@ -35,7 +35,7 @@ constexpr float SMALLEST_NORMAL = 0x1p-38f, LARGEST_NORMAL = 0x1p38f;
 // roundings, the first of 4 u^2, and the second, s + s^2, its product with a, and adding
 // the bound have 21 u^2 m each: 108 u^2 m in all.
 constexpr double ERROR = 192 * double(FLOAT_ROUNDOFF) * double(FLOAT_ROUNDOFF);
-// Of all bounds together: m is less than 2^8 then.
+// Of all bounds together: m is less than 2^-33 / ERROR, or 171, then.
 constexpr float LARGEST_ERROR = 0x1p-33f;
 
 // Covers the roundings of the bounds themselves.
