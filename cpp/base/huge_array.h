@@ -17,6 +17,11 @@ namespace mlrt {
 void *reserve_pages(uint64_t bytes);
 void release_pages(void *pages, uint64_t bytes);
 
+// Memory of any content that begins with a cache line, or with a huge page if it fills one:
+// the first write to a page takes as long for a huge one as for a few small ones. Throws
+// std::bad_alloc. std::free() frees it.
+void *allocate_aligned(uint64_t bytes);
+
 // The first size() of capacity() elements, which never move. Elements that nobody has
 // written are zero.
 template <typename T>

@@ -1,11 +1,11 @@
 // Memory for a picture.
 #pragma once
 
-#include "base/simd.h"
+#include "base/huge_array.h"
 
 #include <cstddef>
+#include <cstdlib>
 #include <memory>
-#include <new>
 #include <type_traits>
 #include <utility>
 
@@ -14,7 +14,7 @@ namespace mlrt {
 struct PixelDelete {
     template <typename T>
     void operator()(T *values) const {
-        ::operator delete(values, std::align_val_t(CACHE_LINE));
+        std::free(values);
     }
 };
 
@@ -31,8 +31,7 @@ class PixelArray {
 public:
     PixelArray() = default;
     explicit PixelArray(size_t size)
-        : values_(size > 0 ? static_cast<T *>(::operator new(size * sizeof(T),
-                                                             std::align_val_t(CACHE_LINE)))
+        : values_(size > 0 ? static_cast<T *>(allocate_aligned(size * sizeof(T)))
                            : nullptr),
           size_(size) {}
 
