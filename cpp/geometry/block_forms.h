@@ -8,6 +8,7 @@
 // all volumes change their sign together.
 #pragma once
 
+#include "base/magnitude.h"
 #include "base/simd.h"
 #include "base/vec.h"
 #include "geometry/triangle_test.h"
@@ -56,10 +57,8 @@ public:
         numerator_ = fused(normal_.x, a.x, fused(normal_.y, a.y, normal_.z * a.z));
         const auto largest = [](const Vec3<Real> &p, const Vec3<Real> &q,
                                 const Vec3<Real> &r) {
-            const auto of = [](const Vec3<Real> &v) {
-                return maximum(absolute(v.x), maximum(absolute(v.y), absolute(v.z)));
-            };
-            return maximum(of(p), maximum(of(q), of(r)));
+            return greatest_size(greatest_size(largest_component(p), largest_component(q)),
+                                 largest_component(r));
         };
         const Real size = largest(a, b, c), edge = largest(ab, bc, ca);
         const auto moderate = (size < LARGEST_SIZE) & (edge < LARGEST_SIZE);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +47,18 @@ def rays_from(
     return np.tile(origin, (count, 1)), directions
 
 
+def assert_same_hits(
+    tree: Any, rays: Rays, t_min: npt.ArrayLike, t_max: npt.ArrayLike
+) -> int:
+    """Returns how many rays hit something."""
+    expected = closest(tree, rays, BRUTE_FORCE, t_min, t_max)
+    for options in (WIDE, ADAPTIVE):
+        closest(tree, rays, options, t_min, t_max).assert_same(expected)
+        hit = occluded(tree, rays, options, t_min, t_max)
+        np.testing.assert_array_equal(hit, expected.face >= 0, f"seed {SEED}")
+    return int((expected.face >= 0).sum())
+
+
 def assert_brute_force(
     rng: np.random.Generator, core: ModuleType, scene: Scene, count: int
 ) -> int:
@@ -64,12 +77,7 @@ def assert_brute_force(
         t = np.where(first.face < 0, np.float32(1), first.t)
         below = np.nextafter(t, np.float32(0))
         for t_min, t_max in ((0, np.inf), (0, t), (0, below), (t, np.inf), (below, t)):
-            expected = closest(tree, rays, BRUTE_FORCE, t_min, t_max)
-            for options in (WIDE, ADAPTIVE):
-                closest(tree, rays, options, t_min, t_max).assert_same(expected)
-                hit = occluded(tree, rays, options, t_min, t_max)
-                np.testing.assert_array_equal(hit, expected.face >= 0)
-            found += int((expected.face >= 0).sum())
+            found += assert_same_hits(tree, rays, t_min, t_max)
     return found
 
 
@@ -127,11 +135,7 @@ def test_same_hits_from_where_triangles_crowd(
         assert (first.face >= 0).sum() > 100, SEED
         t = np.where(first.face < 0, np.float32(1), first.t)
         for t_min, t_max in ((0, np.inf), (t, np.inf), (0, t), (t * (1 - 2e-6), np.inf)):
-            expected = closest(tree, rays, BRUTE_FORCE, t_min, t_max)
-            for options in (WIDE, ADAPTIVE):
-                closest(tree, rays, options, t_min, t_max).assert_same(expected)
-                hit = occluded(tree, rays, options, t_min, t_max)
-                np.testing.assert_array_equal(hit, expected.face >= 0, f"seed {SEED}")
+            assert_same_hits(tree, rays, t_min, t_max)
 
 
 def dense(rng: np.random.Generator) -> tuple[Scene, Rays]:
