@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/counters.h"
+#include "base/magnitude.h"
 #include "geometry/ray_packet.h"
 #include "geometry/triangle.h"
 #include "geometry/triangle_test.h"
@@ -35,8 +36,7 @@ inline FloatPacket hit_distances(const RayPacket<CommonOrigin> &rays, LaneBits l
     const PlaneOf<DoublePacket> plane(a, vertex(3), vertex(6));
     const Vec3d o(rays.origin.point);
     const Vec3<DoublePacket> direction = to_double(rays.direction);
-    const DoublePacket max_direction = maximum(
-        absolute(direction.x), maximum(absolute(direction.y), absolute(direction.z)));
+    const DoublePacket max_direction = largest_component(direction);
     const PlaneNumerator<DoublePacket> numerator(
         plane, Vec3<DoublePacket>{a.x - o.x, a.y - o.y, a.z - o.z});
     const PlaneDistance<DoublePacket> distance(plane, numerator, direction, max_direction);
