@@ -1,5 +1,6 @@
 #include "mlrta/beam_leaf.h"
 
+#include "base/block_order.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/beam_triangle_tests.h"
 #include "mlrta/parallel_walk.h"
@@ -38,27 +39,31 @@ private:
         float near, far; // at which the beam is in a cell
     };
 
+    // Bounds relative to the origin: lower ones in lanes 0 to 2, upper ones in 4 to 6.
+    using Cell = BoxPacket;
+    static constexpr uint32_t UPPER = 4;
+
     // A child that waits for the nearer one.
     struct Pending {
-        uint32_t node;
+        Cell cell;
         Depths depths;
-        uint32_t changes; // of the cell, up to its parent
-        uint32_t bound;   // that its plane moves, and where to
-        float split;
+        uint32_t node;
     };
 
     void prepare_crossings();
     void prepare_sides();
-    bool clip(Depths &depths) const;
-    bool beside() const;
+    Depths depths_in(const Box3f &cell) const;
+    bool beside(const Cell &cell) const;
 
     const KdTree &tree_;
     const BeamPackets &beam_;
     BeamTriangleTests<query> &tests_;
     Counters &counters_;
     std::array<std::array<CrossingDepths, 2>, 3> crossing_; // by axis and side of the plane
-    std::array<float, 6> cell_;      // lower and upper bounds relative to the origin
-    Vec3<PointPacket> side_normals_; // of the four sides of the beam, outward
+    // Of the four sides of the beam, twice: outward normals, and the lanes of the cell's
+    // bounds that they point away from.
+    Vec3<FloatBlock> side_normals_;
+    std::array<UIntBlock, 3> innermost_;
     float side_slack_ = 0;
 };
 
@@ -85,13 +90,17 @@ void BeamWalk<query>::prepare_sides() {
     const float c = r.cosine, s = r.sine;
     const float at_p = r.center_u * c + r.center_v * s;
     const float at_q = r.center_v * c - r.center_u * s;
-    const std::array<float, 4> normal_i{c, -c, -s, s}, normal_j{s, -s, c, -c};
-    const std::array<float, 4> normal_k{
-        beam_.side * (-at_p - r.half_p), beam_.side * (at_p - r.half_p),
-        beam_.side * (-at_q - r.half_q), beam_.side * (at_q - r.half_q)};
-    side_normals_[i] = load<PointPacket>(normal_i.data());
-    side_normals_[j] = load<PointPacket>(normal_j.data());
-    side_normals_[k] = load<PointPacket>(normal_k.data());
+    const float less_p = beam_.side * (-at_p - r.half_p);
+    const float more_p = beam_.side * (at_p - r.half_p);
+    const float less_q = beam_.side * (-at_q - r.half_q);
+    const float more_q = beam_.side * (at_q - r.half_q);
+    side_normals_[i] = FloatBlock(c, -c, -s, s, c, -c, -s, s);
+    side_normals_[j] = FloatBlock(s, -s, c, -c, s, -s, c, -c);
+    side_normals_[k] =
+        FloatBlock(less_p, more_p, less_q, more_q, less_p, more_p, less_q, more_q);
+    for (uint32_t axis = 0; axis < 3; ++axis)
+        innermost_[axis] = select(MaskOf<UIntBlock>(side_normals_[int(axis)] < 0.0f),
+                                  UIntBlock(UPPER + axis), UIntBlock(axis));
     // Sixteen roundings of terms of at most this size are more than there are; and of
     // denormal numbers a few units more.
     const Box3f &bounds = tree_.bounds;
@@ -100,21 +109,22 @@ void BeamWalk<query>::prepare_sides() {
     side_slack_ = 16 * FLOAT_ROUNDOFF * reach * (2 + 2 * beam_.greatest_sum) + 0x1p-140f;
 }
 
-// Whether the cell lies wholly on the outer side of one of the beam's sides.
+// Whether a cell lies wholly on the outer side of one of the beam's sides.
 template <Query query>
-bool BeamWalk<query>::beside() const {
-    PointPacket innermost(-side_slack_);
-    for (int axis = 0; axis < 3; ++axis)
-        innermost = innermost + minimum(side_normals_[axis] * PointPacket(cell_[axis]),
-                                        side_normals_[axis] * PointPacket(cell_[3 + axis]));
+bool BeamWalk<query>::beside(const Cell &cell) const {
+    FloatBlock innermost(-side_slack_);
+    for (uint32_t axis = 0; axis < 3; ++axis)
+        innermost =
+            fused(side_normals_[int(axis)], permuted(cell, innermost_[axis]), innermost);
     return any_lane(innermost > 0.0f);
 }
 
-// Shortens the depths to those of the cell. Returns whether any are left.
+// Those at which the beam is in a cell, which is given relative to the origin.
 template <Query query>
-bool BeamWalk<query>::clip(Depths &depths) const {
+BeamWalk<query>::Depths BeamWalk<query>::depths_in(const Box3f &cell) const {
+    Depths depths{0, INFINITE};
     for (int axis = 0; axis < 3; ++axis) {
-        const float lo = cell_[axis], hi = cell_[3 + axis];
+        const float lo = cell.lo[axis], hi = cell.hi[axis];
         const auto &crossing = crossing_[axis];
         if (lo > 0) {
             depths.near = std::max(depths.near, lo * crossing[0].first - TINY_PARAMETER);
@@ -124,30 +134,23 @@ bool BeamWalk<query>::clip(Depths &depths) const {
             depths.far = std::min(depths.far, -lo * crossing[1].last + TINY_PARAMETER);
         }
     }
-    return depths.near <= depths.far && depths.near < INFINITE;
+    return depths;
 }
 
 template <Query query>
 bool BeamWalk<query>::walk(const Entry &entry) {
-    struct Change {
-        uint32_t bound;
-        float before;
-    };
     std::array<Pending, MAX_TREE_DEPTH + 1> stack;
-    std::array<Change, MAX_TREE_DEPTH + 1> changes;
-    uint32_t pending = 0, changed = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-        cell_[axis] = entry.cell.lo[axis] - beam_.origin[axis];
-        cell_[3 + axis] = entry.cell.hi[axis] - beam_.origin[axis];
-    }
-    // Cells are kept as one box and a list of what to undo.
-    const auto change = [&](uint32_t bound, float value) {
-        changes[changed++] = {bound, cell_[bound]};
-        cell_[bound] = value;
-    };
-    Depths depths{0, INFINITE};
-    if (!clip(depths) || depths.near > tests_.far_end() || tests_.all_done())
+    uint32_t pending = 0;
+    const Box3f first{entry.cell.lo - beam_.origin, entry.cell.hi - beam_.origin};
+    Depths depths = depths_in(first);
+    if (!(depths.near <= depths.far && depths.near < INFINITE) ||
+        depths.near > tests_.far_end() || tests_.all_done())
         return true;
+    Cell cell(first.lo.x, first.lo.y, first.lo.z, 0, first.hi.x, first.hi.y, first.hi.z, 0);
+    const auto moved = [](const Cell &cell, uint32_t bound, float to) {
+        return select(MaskOf<Cell>(drjit::arange<BoxLanes>() == BoxLanes(int(bound))),
+                      Cell(to), cell);
+    };
     KdNode node = tree_.node(entry.node);
     for (;;) {
         ++counters_.beam_steps;
@@ -171,21 +174,19 @@ bool BeamWalk<query>::walk(const Entry &entry) {
                 // written even if it does not wait, and where only the far side is entered
                 // that begins no later than the cell.
                 const bool to_lower = enter_near != above;
-                stack[pending] = {node.lower_child() + 1 - above,
+                stack[pending] = {moved(cell, axis + UPPER * above, distance),
                                   {maximum(first, depths.near), depths.far},
-                                  changed,
-                                  axis + 3 * above,
-                                  distance};
+                                  node.lower_child() + 1 - above};
                 pending += uint32_t(enter_near & enter_far);
                 const uint32_t index = node.lower_child() + !to_lower;
                 depths.far = enter_near ? minimum(last, depths.far) : depths.far;
-                change(axis + 3 * to_lower, distance);
+                cell = moved(cell, axis + UPPER * to_lower, distance);
                 node = chosen(!to_lower, lower, upper);
                 if (node.is_unbuilt()) [[unlikely]]
                     node = tree_.node(index);
                 continue;
             }
-        } else if (node.reference_count() > 0 && !beside()) {
+        } else if (node.reference_count() > 0 && !beside(cell)) {
             ++counters_.leaf_visits;
             tests_.test_leaf(node);
             if (tests_.spent())
@@ -197,17 +198,11 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             if (pending == 0 || tests_.all_done())
                 return true;
             const Pending &next = stack[--pending];
-            if (next.depths.near > tests_.far_end())
+            if (next.depths.near > tests_.far_end() || beside(next.cell))
                 continue;
-            while (changed > next.changes) {
-                --changed;
-                cell_[changes[changed].bound] = changes[changed].before;
-            }
-            change(next.bound, next.split);
-            if (beside())
-                continue;
-            node = tree_.node(next.node);
+            cell = next.cell;
             depths = next.depths;
+            node = tree_.node(next.node);
             break;
         }
     }
