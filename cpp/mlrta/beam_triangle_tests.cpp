@@ -50,20 +50,16 @@ void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) 
 template <Query query>
 void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
     for (const uint32_t primitive : tree_.references_of(leaf)) {
-        if (mailbox_.put(primitive))
-            continue;
-        waiting_[waiting_count_++] = primitive;
-        if (dense_) {
+        // Without a branch, as nobody foresees which are known.
+        waiting_[waiting_count_] = primitive;
+        waiting_count_ += !mailbox_.put(primitive);
+        if (dense_)
             prefetch(&tree_.triangles[primitive]);
-            if (waiting_count_ == waiting_.size()) {
-                test_block(waiting_.data(), WIDE_WIDTH);
-                waiting_count_ -= WIDE_WIDTH;
-                std::copy_n(waiting_.begin() + WIDE_WIDTH, waiting_count_,
-                            waiting_.begin());
-            }
-        } else if (waiting_count_ == WIDE_WIDTH) {
-            flush();
-        }
+        if (waiting_count_ < (dense_ ? waiting_.size() : WIDE_WIDTH))
+            continue;
+        test_block(waiting_.data(), WIDE_WIDTH);
+        waiting_count_ -= WIDE_WIDTH;
+        std::copy_n(waiting_.begin() + WIDE_WIDTH, waiting_count_, waiting_.begin());
     }
     if (!dense_)
         flush();
