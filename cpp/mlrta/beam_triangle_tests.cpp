@@ -92,35 +92,45 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         grid_.fill(beam_);
         dense_ = true;
     }
-    // All pairs first, so that the loop over them, which is the inner one, is long and its
-    // end easy to foresee.
-    uint32_t pairs = 0;
+    // All pairs of runs and triangles first, then all of packets and triangles, so that
+    // loops are long and their ends easy to foresee.
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
-    bool any_covered = false;
-    uint64_t in_pairs = 0; // packets
+    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + PACKET_WIDTH> of_runs;
+    uint32_t run_pairs = 0;
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
+        const LaneBits triangles =
+            one_run ? possible : possible & forms.possible_for(beam_.runs[n]);
+        store_compressed(of_runs.data() + run_pairs,
+                         lane_indices() * BeamPackets::CAPACITY +
+                             UIntPacket(n * PACKET_WIDTH),
+                         triangles);
+        run_pairs += uint32_t(std::popcount(triangles));
+    }
+    bool any_covered = false;
+    uint32_t pairs = 0;
+    uint64_t in_pairs = 0; // packets
+    for (uint32_t i = 0; i < run_pairs; ++i) {
+        const uint32_t first = of_runs[i];
+        const uint32_t n = first % BeamPackets::CAPACITY / PACKET_WIDTH,
+                       lane = first / BeamPackets::CAPACITY;
         const BeamPackets::Run &run = beam_.runs[n];
-        const LaneBits triangles = one_run ? possible : possible & forms.possible_for(run);
-        for_each_lane(triangles, [&](uint32_t lane) {
-            LaneBits packets;
-            if constexpr (query == Query::any) {
-                packets = forms.packets_for(lane, run);
-            } else {
-                const auto coverage = forms.coverage_of(lane, beam_, run);
-                packets = coverage.possible & ~coverage.covered;
-                in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
-                if (coverage.covered != 0) {
-                    cover(n, coverage, forms, lane, numbers[lane]);
-                    any_covered = true;
-                }
+        LaneBits packets;
+        if constexpr (query == Query::any) {
+            packets = forms.packets_for(lane, run);
+        } else {
+            const auto coverage = forms.coverage_of(lane, beam_, run);
+            packets = coverage.possible & ~coverage.covered;
+            in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
+            if (coverage.covered != 0) {
+                cover(n, coverage, forms, lane, numbers[lane]);
+                any_covered = true;
             }
-            const uint32_t first = lane * BeamPackets::CAPACITY + n * PACKET_WIDTH;
-            store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
-                             packets);
-            pairs += uint32_t(std::popcount(packets));
-        });
+        }
+        store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
+                         packets);
+        pairs += uint32_t(std::popcount(packets));
     }
     counters_.triangle_tests += pairs;
     if constexpr (query == Query::closest)
