@@ -179,18 +179,14 @@ LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) 
 TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPackets &beam,
                                                    const BeamPackets::Run &run) const {
     const auto value_of = [lane](const Lanes &lanes) { return FloatPacket(lanes[lane]); };
+    // Without branches: nobody foresees where triangles lie.
     Coverage packets;
-    packets.covered = 0;
     packets.possible = to_bits(may_hit(run, load<FloatPacket>(run.least), value_of));
-    if (packets.possible == 0)
-        return packets;
     const auto least = [&](int form) {
         return range_of<FloatPacket>(form, run, value_of).least();
     };
     const FloatPacket edges = minimum(least(0), minimum(least(1), least(2)));
     const auto inside = edges > (EXACT ? value_of(edge_error) : FloatPacket(0.0f));
-    if ((to_bits(inside) & packets.possible) == 0)
-        return packets;
     const FormRange<FloatPacket> depth = range_of<FloatPacket>(DEPTH, run, value_of);
     packets.least = depth.least();
     packets.greatest = depth.greatest();
