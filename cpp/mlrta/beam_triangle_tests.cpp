@@ -342,11 +342,17 @@ void BeamTriangleTests<query>::update_least(uint64_t packets) {
         if (changed == 0)
             continue;
         BeamPackets::Run &run = beam_.runs[n];
+        // In a register: lanes that were written one by one are read late.
+        FloatPacket least = load<FloatPacket>(run.least);
         for_each_lane(changed, [&](uint32_t i) {
-            run.least[i] = least_lane(beam_.packets[n * PACKET_WIDTH + i].least);
-            run.greatest[i] = INFINITE;
+            const float of_packet = least_lane(beam_.packets[n * PACKET_WIDTH + i].least);
+            least = select(from_bits<FloatPacket>(1u << i), FloatPacket(of_packet), least);
         });
-        run.all.least = least_lane(load<FloatPacket>(run.least));
+        store(run.least.data(), least);
+        store(run.greatest.data(),
+              select(from_bits<FloatPacket>(changed), FloatPacket(INFINITE),
+                     load<FloatPacket>(run.greatest)));
+        run.all.least = least_lane(least);
     }
     update_least();
 }
