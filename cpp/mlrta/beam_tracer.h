@@ -245,13 +245,13 @@ private:
     // share of that of all: usually, and where beams meet so many triangles that smaller
     // ones pay. Measured on office, conference, sponza, building and dragon: shares from
     // 0.6 to 0.9, limits from 0.12 to 0.5 triangles a ray.
-    static constexpr float USUAL_SHARE = 0.6f, COSTLY_SHARE = 0.9f;
-    static constexpr float COSTLY_TRIANGLES_PER_RAY = 0.3f;
+    static constexpr float USUAL_SHARE = 0.6f, COSTLY_SHARE = 0.75f;
+    static constexpr float COSTLY_TRIANGLES_PER_RAY = 0.5f;
 
     // Rays that no camera has made are taken as large beams as long as the ones before met
     // no more triangles than this. Chosen from 0.05 to no limit, and beams of a camera from
     // that too, by the frames of office, conference, sponza and building.
-    static constexpr float LARGE_TRIANGLES_PER_RAY = 0.1f;
+    static constexpr float LARGE_TRIANGLES_PER_RAY = 0.2f;
 
     // Where beams met more triangles a ray, those of a camera are bounded by their rays,
     // and not by the film if that leaves open where in a pixel they lie. Chosen from 0.1

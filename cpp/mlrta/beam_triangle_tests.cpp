@@ -15,8 +15,8 @@ namespace mlrt {
 namespace {
 
 // A beam that has been tested against more triangles than these meets a dense surface;
-// chosen.
-constexpr uint32_t DENSE_TRIANGLES = 64;
+// chosen from 40 to 300.
+constexpr uint32_t DENSE_TRIANGLES = 200;
 
 Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
