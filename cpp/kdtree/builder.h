@@ -24,7 +24,7 @@ struct BuildOptions {
     // triangles eight at a time, so a triangle costs less than a step. Chosen from 0.1 to
     // 1.5 by the frames of office, conference, sponza and building.
     float traversal_cost = 1.0f;
-    float intersection_cost = 0.15f;
+    float intersection_cost = 0.125f;
     float empty_bonus = 0.8f; // factor on the cost of a split that cuts off empty space
     bool clip = true;         // "perfect splits": bounds of triangles clipped to the cell
     bool rule_empty_cell = true;   // rule 1
