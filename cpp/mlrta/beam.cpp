@@ -301,6 +301,11 @@ CameraRays camera_rays(const RayGroup &rays, const CameraTile &tile) {
     CameraRays camera{tile, 0, -INFINITY, false};
     if (rays.count == 0)
         return camera;
+    if (!rays.t_min.each() && !rays.t_max.each()) {
+        const float t_min = std::max(rays.t_min.common(), 0.0f);
+        const float t_max = rays.t_max.common();
+        return t_min < t_max ? CameraRays{tile, t_min, t_max, true} : camera;
+    }
     FloatPacket greatest_t_min(0.0f), greatest_t_max(-INFINITY);
     const FloatPacket first_t_min(rays.t_min[0]), first_t_max(rays.t_max[0]);
     MaskOf<FloatPacket> alike = true;

@@ -38,8 +38,7 @@ struct OrderedRays {
     RayGroup group;
 
     OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers)
-        : t_min(in_order(numbers, rays.t_min)), t_max(in_order(numbers, rays.t_max)),
-          group(rays) {
+        : group(rays) {
         for (int k = 0; k < 3; ++k) {
             direction[k] = in_order(numbers, rays.direction[k]);
             group.direction[k] = direction[k].data();
@@ -48,8 +47,14 @@ struct OrderedRays {
                 group.origin[k] = origin[k].data();
             }
         }
-        group.t_min = t_min.data();
-        group.t_max = t_max.data();
+        if (rays.t_min.each()) {
+            t_min = in_order(numbers, rays.t_min.each());
+            group.t_min = t_min.data();
+        }
+        if (rays.t_max.each()) {
+            t_max = in_order(numbers, rays.t_max.each());
+            group.t_max = t_max.data();
+        }
     }
     OrderedRays(const OrderedRays &) = delete;
     OrderedRays &operator=(const OrderedRays &) = delete;
