@@ -30,8 +30,8 @@ private:
 
     Box3f begin_, end_, bounds_; // bounds of both
     double reach_;
-    // Planes that bound the hull, parallel to one axis each, which touch edges of both boxes. Outside where normal.x > offset; the offsets have room for
-    // roundings.
+    // Planes that bound the hull, parallel to one axis each, which touch edges of both
+    // boxes. Outside where normal.x > offset; the offsets have room for roundings.
     Vec3<DoubleBlock> normal_;
     DoubleBlock offset_;
 };

@@ -191,8 +191,7 @@ void ShaftTracer::test_candidates(uint32_t first, uint32_t count) {
             state.test(packet, state.searching, tree_.triangles[candidates_[c]],
                        candidates_[c], counters_);
         for_each_lane(state.hits.found, [&](uint32_t lane) { occluded_[i + lane] = 1; });
-        for_each_lane(extreme & in_run,
-                      [&](uint32_t lane) { left_.push_back(i + lane); });
+        for_each_lane(extreme & in_run, [&](uint32_t lane) { left_.push_back(i + lane); });
     }
 }
 

@@ -29,11 +29,13 @@ public:
     std::vector<uint32_t> trace(uint8_t *occluded);
 
 private:
-    static constexpr uint32_t LARGE = 1024, SMALL = 64; // rays of a run; chosen
+    static constexpr uint32_t LARGE = 1024, SMALL = 64; // rays of a run
 
-    // What a shaft meets, up to what may be tested against each of its packets; chosen.
-    static constexpr uint32_t MOST_CANDIDATES = 4;
-    // Nodes and triangles that a shaft may be tested against; chosen.
+    // Triangles that may be tested against each packet of a run; and nodes and triangles
+    // that may be tested against its shaft. Chosen, as the sizes of runs, by frames of
+    // cornell-box, living-room and conference with an area light, from 2 to 64 triangles;
+    // most shafts that meet a dozen meet hundreds.
+    static constexpr uint32_t MOST_CANDIDATES = 12;
     static constexpr uint32_t MOST_STEPS = 256, MOST_TRIANGLES = 64;
 
     void trace_run(uint32_t first, uint32_t count);

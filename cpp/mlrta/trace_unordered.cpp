@@ -12,7 +12,7 @@ namespace mlrt {
 
 namespace {
 
-bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
+bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
     return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
@@ -38,8 +38,7 @@ struct OrderedRays {
     std::vector<float> origin[3], direction[3], t_min, t_max;
     RayGroup group;
 
-    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers)
-        : group(rays) {
+    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers) : group(rays) {
         group.count = uint32_t(numbers.size());
         for (int k = 0; k < 3; ++k) {
             direction[k] = in_order(numbers, rays.direction[k]);
@@ -88,7 +87,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options))
+    if (may_be_regrouped(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -108,7 +107,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
 void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
-    if (are_parallel(rays) || !may_be_sorted(rays, options)) {
+    if (!may_be_regrouped(rays, options) || are_parallel(rays)) {
         trace_any(tree, rays, options, occluded, counters);
         return;
     }
