@@ -1,4 +1,4 @@
-// The lanes of a block in another order.
+// The lanes of a block in another order, or one of them replaced.
 #pragma once
 
 #include "base/simd.h"
@@ -28,6 +28,12 @@ Block permuted(const Block &block, const UIntBlock &order) {
         result.entry(lane) = block.entry(order.entry(lane) & (BLOCK_WIDTH - 1));
     return result;
 #endif
+}
+
+// The block with another value in one lane.
+inline FloatBlock with_lane(const FloatBlock &block, uint32_t lane, float value) {
+    return select(MaskOf<FloatBlock>(drjit::arange<UIntBlock>() == lane), FloatBlock(value),
+                  block);
 }
 
 } // namespace mlrt

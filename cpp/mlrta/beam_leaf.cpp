@@ -40,7 +40,7 @@ private:
     };
 
     // Bounds relative to the origin: lower ones in lanes 0 to 2, upper ones in 4 to 6.
-    using Cell = BoxPacket;
+    using Cell = FloatBlock;
     static constexpr uint32_t UPPER = 4;
 
     // A child that waits for the nearer one.
@@ -141,16 +141,12 @@ template <Query query>
 bool BeamWalk<query>::walk(const Entry &entry) {
     std::array<Pending, MAX_TREE_DEPTH + 1> stack;
     uint32_t pending = 0;
-    const Box3f first{entry.cell.lo - beam_.origin, entry.cell.hi - beam_.origin};
-    Depths depths = depths_in(first);
+    const Vec3f lo = entry.cell.lo - beam_.origin, hi = entry.cell.hi - beam_.origin;
+    Depths depths = depths_in({lo, hi});
     if (!(depths.near <= depths.far && depths.near < INFINITE) ||
         depths.near > tests_.far_end() || tests_.all_done())
         return true;
-    Cell cell(first.lo.x, first.lo.y, first.lo.z, 0, first.hi.x, first.hi.y, first.hi.z, 0);
-    const auto moved = [](const Cell &cell, uint32_t bound, float to) {
-        return select(MaskOf<Cell>(drjit::arange<BoxLanes>() == BoxLanes(int(bound))),
-                      Cell(to), cell);
-    };
+    Cell cell(lo.x, lo.y, lo.z, 0, hi.x, hi.y, hi.z, 0);
     KdNode node = tree_.node(entry.node);
     for (;;) {
         ++counters_.beam_steps;
@@ -174,13 +170,13 @@ bool BeamWalk<query>::walk(const Entry &entry) {
                 // written even if it does not wait, and where only the far side is entered
                 // that begins no later than the cell.
                 const bool to_lower = enter_near != above;
-                stack[pending] = {moved(cell, axis + UPPER * above, distance),
+                stack[pending] = {with_lane(cell, axis + UPPER * above, distance),
                                   {maximum(first, depths.near), depths.far},
                                   node.lower_child() + 1 - above};
                 pending += uint32_t(enter_near & enter_far);
                 const uint32_t index = node.lower_child() + !to_lower;
                 depths.far = enter_near ? minimum(last, depths.far) : depths.far;
-                cell = moved(cell, axis + UPPER * to_lower, distance);
+                cell = with_lane(cell, axis + UPPER * to_lower, distance);
                 node = chosen(!to_lower, lower, upper);
                 if (node.is_unbuilt()) [[unlikely]]
                     node = tree_.node(index);
