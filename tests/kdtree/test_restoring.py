@@ -22,7 +22,7 @@ SEED = 20261123
 MAX_DEPTH: int = core.kdtree_selftest.max_tree_depth
 
 RNG = np.random.default_rng(SEED)
-VERTICES, FACES = workloads.soup(RNG, 60)
+VERTICES, FACES = workloads.soup(RNG, 200)
 DEGENERATE = 23
 VERTICES[FACES[DEGENERATE, 2]] = VERTICES[FACES[DEGENERATE, 1]]
 RAYS = RNG.normal(size=(2, 300, 3)).astype(np.float32)

@@ -114,7 +114,8 @@ def test_same_tree_by_any_number_of_threads(builder: str, name: str) -> None:
 def test_lazy_trees_end_up_as_fast_ones(name: str) -> None:
     vertices, faces = large_scenes()[name]
     lazy, fast = (
-        contents(BuiltTree(vertices[faces], **BUILDERS[b])) for b in ("lazy", "fast")
+        contents(BuiltTree(vertices[faces], **BUILDERS[b], intersection_cost=0.375))
+        for b in ("lazy", "fast")
     )
     assert len(fast) > 10_000
     assert lazy == fast
