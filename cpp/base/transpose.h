@@ -56,6 +56,39 @@ load_columns(const std::array<const float *, PACKET_WIDTH> &rows) {
     return columns;
 }
 
+// Four values of each of sixteen rows, which begin `stride` apart, as columns: result[i]
+// holds value i of each row.
+inline std::array<FloatPacket, 4> load_four_columns(const float *rows, size_t stride) {
+#if defined(__AVX512F__)
+    // Rows i, i + 4, i + 8 and i + 12.
+    const auto four_rows = [&](size_t i) {
+        const auto row = [&](size_t j) { return _mm_loadu_ps(rows + (i + j) * stride); };
+        __m512 four = _mm512_castps128_ps512(row(0));
+        four = _mm512_insertf32x4(four, row(4), 1);
+        four = _mm512_insertf32x4(four, row(8), 2);
+        return _mm512_insertf32x4(four, row(12), 3);
+    };
+    const __m512 a = four_rows(0), b = four_rows(1), c = four_rows(2), d = four_rows(3);
+    const auto of_pairs = [](__m512 low, __m512 high, auto &&unpack) {
+        return FloatPacket(
+            _mm512_castpd_ps(unpack(_mm512_castps_pd(low), _mm512_castps_pd(high))));
+    };
+    const auto lower = [](__m512d v, __m512d w) { return _mm512_unpacklo_pd(v, w); };
+    const auto upper = [](__m512d v, __m512d w) { return _mm512_unpackhi_pd(v, w); };
+    const __m512 ab = _mm512_unpacklo_ps(a, b), cd = _mm512_unpacklo_ps(c, d);
+    const __m512 ab_high = _mm512_unpackhi_ps(a, b), cd_high = _mm512_unpackhi_ps(c, d);
+    return {of_pairs(ab, cd, lower), of_pairs(ab, cd, upper),
+            of_pairs(ab_high, cd_high, lower), of_pairs(ab_high, cd_high, upper)};
+#else
+    std::array<LaneArray<float>, 4> columns;
+    for (size_t row = 0; row < PACKET_WIDTH; ++row)
+        for (size_t i = 0; i < 4; ++i)
+            columns[i][row] = rows[row * stride + i];
+    return {load<FloatPacket>(columns[0]), load<FloatPacket>(columns[1]),
+            load<FloatPacket>(columns[2]), load<FloatPacket>(columns[3])};
+#endif
+}
+
 // Sixteen packets, and a value of each.
 using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
 

@@ -36,6 +36,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
                 ? float(emitter_samples_) / float(sampling.emitter_samples)
                 : float(emitter_samples_);
         factors_.push_back(std::numbers::inv_pi_v<float> / shared_by);
+        factors_differ_ |= factors_.back() != factors_.front();
     }
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);

@@ -83,7 +83,7 @@ struct ShadedPacket {
     FloatPacket cos_view;
     Vec3<FloatPacket> albedo;
     EmitterChoices choices;
-    EmitterSample<FloatPacket> light; // if all emitters are points
+    EmitterSample<FloatPacket> light; // if all lanes are sampled at once
 };
 
 class TileRenderer {
@@ -115,8 +115,13 @@ private:
     // In emitter_light.cpp: packets of which hits and points are known.
     void shade(std::span<ShadedPacket> packets);
     void find_reflectance(ShadedPacket &packet);
+    // Whether all lanes of a packet are, whichever emitters they choose.
+    bool samples_at_once() const {
+        return scene_.all_emitters_are_points || scene_.data.emitters.size() == 1;
+    }
     void choose_light(ShadedPacket &packet, uint32_t sample);
     void add_emitter_sample(const ShadedPacket &packet, uint32_t sample);
+    FloatPacket factors_of(const UIntPacket &emitters, LaneBits lanes) const;
     void add_light(const ShadedPacket &packet, LaneBits lanes,
                    const EmitterSample<FloatPacket> &light, const UIntPacket &emitters);
     // In bsdf_light.cpp.
@@ -146,6 +151,7 @@ private:
     const SampleStreams &streams_;
     uint32_t emitter_samples_;
     std::vector<float> factors_; // of the cosine, one an emitter
+    bool factors_differ_ = false;
     TraceOptions options_;
     ShadowOffset offset_;
     TileTarget target_;
