@@ -75,6 +75,11 @@ struct Sampling {
     uint32_t bsdf_samples = 0;
 };
 
+// How rays with a common origin go through the scene, and how others do.
+struct RayOptions {
+    TraceOptions together, alone;
+};
+
 // A packet on its way from surfaces to shadow rays.
 struct ShadedPacket {
     HitPacket hit;
@@ -89,7 +94,7 @@ struct ShadedPacket {
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const Sampling &sampling, const TraceOptions &options, ShadowOffset offset,
+                 const Sampling &sampling, const RayOptions &options, ShadowOffset offset,
                  TileTarget target);
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
@@ -152,7 +157,7 @@ private:
     uint32_t emitter_samples_;
     std::vector<float> factors_; // of the cosine, one an emitter
     bool factors_differ_ = false;
-    TraceOptions options_;
+    RayOptions options_;
     ShadowOffset offset_;
     TileTarget target_;
     RenderCounters counters_;
