@@ -88,9 +88,28 @@ void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
         new (&packet.light) EmitterSample<FloatPacket>(
             sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p));
     else if (samples_at_once())
-        new (&packet.light) EmitterSample<FloatPacket>(
-            sample_chosen(scene_, 0, packet.choices, packet.point.p,
-                          of_rays(packet.hit, samples_.light_y(sample))));
+        sample_lights(packet, of_rays(packet.hit, samples_.light_y(sample)));
+}
+
+// Of the emitters that the lanes chose, whichever they are.
+void TileRenderer::sample_lights(ShadedPacket &packet, const FloatPacket &y) {
+    const EmitterChoices &choices = packet.choices;
+    const auto light_of = [&](uint32_t emitter) {
+        return sample_chosen(scene_, emitter, choices, packet.point.p, y);
+    };
+    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(packet.lanes)));
+    new (&packet.light) EmitterSample<FloatPacket>(light_of(first));
+    const LaneBits others = packet.lanes & ~to_bits(choices.emitter == UIntPacket(first));
+    for_each_value(choices.emitter, others, [&](uint32_t emitter, LaneBits holders) {
+        const EmitterSample<FloatPacket> light = light_of(emitter);
+        const auto mask = from_bits<FloatPacket>(holders);
+        for (int k = 0; k < 3; ++k) {
+            packet.light.weight[k] = select(mask, light.weight[k], packet.light.weight[k]);
+            packet.light.direction[k] =
+                select(mask, light.direction[k], packet.light.direction[k]);
+            packet.light.target[k] = select(mask, light.target[k], packet.light.target[k]);
+        }
+    });
 }
 
 void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sample) {
@@ -119,7 +138,7 @@ FloatPacket TileRenderer::factors_of(const UIntPacket &emitters, LaneBits lanes)
     return factors;
 }
 
-// Of the emitters that the lanes chose, all of them points if they are several.
+// Of the emitters that the lanes chose. With robust offsets several must all be points.
 void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
                              const EmitterSample<FloatPacket> &light,
                              const UIntPacket &emitters) {

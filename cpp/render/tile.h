@@ -88,7 +88,8 @@ struct ShadedPacket {
     FloatPacket cos_view;
     Vec3<FloatPacket> albedo;
     EmitterChoices choices;
-    EmitterSample<FloatPacket> light; // if all lanes are sampled at once
+    // If all lanes are sampled at once: faces any, unless all choose the same emitter.
+    EmitterSample<FloatPacket> light;
 };
 
 class TileRenderer {
@@ -120,11 +121,14 @@ private:
     // In emitter_light.cpp: packets of which hits and points are known.
     void shade(std::span<ShadedPacket> packets);
     void find_reflectance(ShadedPacket &packet);
-    // Whether all lanes of a packet are, whichever emitters they choose.
+    // Whether all lanes of a packet are, whichever emitters they choose. Robust offsets ask
+    // what each sample lies on.
     bool samples_at_once() const {
-        return scene_.all_emitters_are_points || scene_.data.emitters.size() == 1;
+        return offset_ == ShadowOffset::mitsuba || scene_.all_emitters_are_points ||
+               scene_.data.emitters.size() == 1;
     }
     void choose_light(ShadedPacket &packet, uint32_t sample);
+    void sample_lights(ShadedPacket &packet, const FloatPacket &y);
     void add_emitter_sample(const ShadedPacket &packet, uint32_t sample);
     FloatPacket factors_of(const UIntPacket &emitters, LaneBits lanes) const;
     void add_light(const ShadedPacket &packet, LaneBits lanes,
