@@ -40,6 +40,14 @@ FilmTarget film_target(RenderResult &result) {
     return target;
 }
 
+// A tile, unless there would be too few of them for all threads to have work.
+uint32_t rays_per_group(const TraceOptions &options, double samples) {
+    constexpr double ENOUGH_GROUPS = 16; // chosen
+    constexpr double LARGE_BEAM = 1024;  // smaller groups would cut beams short
+    const double tile = double(options.initial_tile) * options.initial_tile;
+    return uint32_t(std::min(tile, std::max(LARGE_BEAM, samples / ENOUGH_GROUPS)));
+}
+
 } // namespace
 
 bool render(const PreparedScene &scene, const RenderSettings &settings,
@@ -51,13 +59,13 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     const PixelRect &sampled = picture.sampled();
     const SampleStreams streams(settings.seed, sampled.width * sampled.height,
                                 settings.samples_per_pixel);
-    const uint32_t side = settings.trace.initial_tile;
-    const WorkItems items(sampled, settings.samples_per_pixel, side * side);
+    const double all_samples =
+        double(sampled.width) * sampled.height * settings.samples_per_pixel;
+    const WorkItems items(sampled, settings.samples_per_pixel,
+                          rays_per_group(settings.trace, all_samples));
     const TileTarget target{picture, ChannelNumbers(settings.aovs), result.primitive.data(),
                             result.cost.data()};
 
-    const double all_samples =
-        double(sampled.width) * sampled.height * settings.samples_per_pixel;
     const std::optional<RayOptions> options = prepare_rays(
         scene, settings, all_samples, [&] { return cancelled && cancelled(0); });
     if (!options)
