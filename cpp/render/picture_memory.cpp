@@ -46,6 +46,11 @@ public:
         bytes_ += bytes;
     }
 
+    uint64_t bytes() {
+        const std::lock_guard lock(mutex_);
+        return bytes_;
+    }
+
 private:
     struct Block {
         void *memory;
@@ -78,6 +83,10 @@ void give_back_picture_memory(void *memory, uint64_t bytes) noexcept {
         picture_memory().keep(memory, bytes);
     else
         std::free(memory);
+}
+
+uint64_t kept_picture_bytes() {
+    return picture_memory().bytes();
 }
 
 } // namespace mlrt

@@ -17,4 +17,7 @@ void *take_picture_memory(uint64_t bytes);
 // Keeps it for a picture of the same size. `bytes` are those that were asked for.
 void give_back_picture_memory(void *memory, uint64_t bytes) noexcept;
 
+// What is kept now.
+uint64_t kept_picture_bytes();
+
 } // namespace mlrt

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import scene_files
 
+from mlrt_plugin._dispatch import core
 from mlrt_plugin.options import AOVS
-from mlrt_plugin.peak_memory import OWN_PROCESS, resident_bytes
 from mlrt_plugin.render import PreparedScene, prepare
 
 SceneFile = Callable[..., Path]
@@ -80,14 +79,18 @@ def test_threads_that_render_at_once_share_no_picture(scene_file: SceneFile) -> 
 
 
 def test_no_more_is_kept_than_64_mib(scene_file: SceneFile) -> None:
-    if not (OWN_PROCESS / "status").exists():
-        pytest.skip("the system does not tell what memory is resident")
-    large, small = floor(scene_file, 2560), floor(scene_file, 1280)
-    result = large.render(spp=1)  # 79 MB
-    before = resident_bytes("VmRSS")
-    del result
-    assert resident_bytes("VmRSS") < before - 70e6
-    results = [small.render(spp=1) for _ in range(8)]  # 157 MB
-    before = resident_bytes("VmRSS")
+    kept_bytes = core.render_selftest.kept_picture_bytes
+    small = floor(scene_file, 1280)
+    results = [small.render(spp=1) for _ in range(8)]
+    of_one = results[0].image.nbytes
     del results
-    assert resident_bytes("VmRSS") < before - 80e6
+    assert kept_bytes() == 2**26 // of_one * of_one
+    small.render(spp=1)
+    assert kept_bytes() == 2**26 // of_one * of_one
+    held = small.render(spp=1)
+    assert kept_bytes() == (2**26 // of_one - 1) * of_one
+    # Neither what is larger nor what is small takes its place.
+    for side in (2560, 16):
+        floor(scene_file, side).render(spp=1)
+        assert kept_bytes() == (2**26 // of_one - 1) * of_one
+    del held
