@@ -27,8 +27,8 @@ class TileRenderer {
 public:
     TileRenderer(const EmbreeScene &scene, const View &view, bool shadows,
                  uint32_t block_count, Buffers<Mode> &buffers)
-        : scene_(scene.handle()), view_(view), shadows_(shadows), primary_(buffers.primary),
-          shadow_(buffers.shadow), cosine_(buffers.cosine) {
+        : scene_(scene.handle()), view_(view), directions_(view), shadows_(shadows),
+          primary_(buffers.primary), shadow_(buffers.shadow), cosine_(buffers.cosine) {
         primary_.prepare({block_count, view.camera.origin, view.near_clip});
         if (shadows) {
             shadow_.prepare({block_count, view.light, SHADOW_EPSILON});
@@ -42,8 +42,7 @@ public:
         const uint32_t count = tile.block_count();
         for (uint32_t i = 0; i < count; ++i) {
             const Block block = block_of(tile, i, view_);
-            primary_.set(i, primary_directions(view_, block), block.on_film,
-                         view_.far_clip);
+            primary_.set(i, directions_(block), block.on_film, view_.far_clip);
         }
         Mode::intersect(scene_, context_, primary_, count);
         for (uint32_t i = 0; i < count; ++i)
@@ -87,6 +86,7 @@ private:
 
     RTCScene scene_;
     const View &view_;
+    const PrimaryDirections directions_;
     bool shadows_;
     RTCIntersectContext context_;
     typename Mode::Primary &primary_;

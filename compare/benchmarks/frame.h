@@ -7,6 +7,7 @@
 #pragma once
 
 #include "base/parallel.h"
+#include "base/reciprocal_estimate.h"
 #include "base/simd.h"
 #include "mlrta/beam.h"
 
@@ -106,21 +107,30 @@ inline Block block_of(const RayTile &tile, uint32_t index, const View &view) {
     return block;
 }
 
-// Directions of a block's primary rays. Positions are exact: they have few digits.
-inline Vec3<FloatPacket> primary_directions(const View &view, const Block &block) {
-    const FloatPacket scale = 1.0f / float(view.grid);
-    const FloatPacket x = (float(block.x) + load<FloatPacket>(LANE_CENTRES.x)) * scale;
-    const FloatPacket y = (float(block.y) + load<FloatPacket>(LANE_CENTRES.y)) * scale;
-    const CameraMap &camera = view.camera;
-    return (in_all_lanes(camera.base) + x * in_all_lanes(camera.dx)) +
-           y * in_all_lanes(camera.dy);
-}
+// Directions of blocks of primary rays.
+class PrimaryDirections {
+public:
+    explicit PrimaryDirections(const View &view)
+        : base_(in_all_lanes(view.camera.base)), dx_(in_all_lanes(view.camera.dx)),
+          dy_(in_all_lanes(view.camera.dy)), scale_(1.0f / float(view.grid)) {}
 
-// The value in the given lanes, zero in the others.
-inline FloatPacket in_lanes(LaneBits lanes, const FloatPacket &value) {
+    // Positions are exact: they have few digits.
+    Vec3<FloatPacket> operator()(const Block &block) const {
+        const FloatPacket x = (float(block.x) + load<FloatPacket>(LANE_CENTRES.x)) * scale_;
+        const FloatPacket y = (float(block.y) + load<FloatPacket>(LANE_CENTRES.y)) * scale_;
+        return (base_ + x * dx_) + y * dy_;
+    }
+
+private:
+    Vec3<FloatPacket> base_, dx_, dy_;
+    FloatPacket scale_;
+};
+
+// The value in the given lanes, another one elsewhere.
+inline FloatPacket in_lanes(LaneBits lanes, const FloatPacket &value, float other = 0) {
     return lanes == ALL_LANES
                ? value
-               : select(from_bits<FloatPacket>(lanes), value, FloatPacket(0.0f));
+               : select(from_bits<FloatPacket>(lanes), value, FloatPacket(other));
 }
 
 struct Shading {
@@ -134,9 +144,9 @@ inline Shading shade(const View &view, const Vec3<FloatPacket> &direction,
     Shading result;
     result.from_light =
         (in_all_lanes(view.camera.origin) + t * direction) - in_all_lanes(view.light);
-    result.cosine =
-        absolute(dot(normal, result.from_light)) /
-        square_root(dot(normal, normal) * dot(result.from_light, result.from_light));
+    result.cosine = absolute(dot(normal, result.from_light)) *
+                    reciprocal_root_estimate(dot(normal, normal) *
+                                             dot(result.from_light, result.from_light));
     return result;
 }
 

@@ -4,6 +4,7 @@
 #include "kdtree/wide_maker.h"
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <mutex>
 #include <vector>
@@ -12,29 +13,30 @@ namespace mlrt::bench {
 
 namespace {
 
-// The rays of one tile, in the order of the grid; reused from tile to tile.
+// The rays of one tile, in the order of the grid; reused from tile to tile. A direction of
+// no numbers makes a ray inactive.
 struct TileRays {
-    std::vector<float> direction[3], t_min, t_max, t, cosine;
+    std::vector<float> direction[3], t, cosine;
     std::vector<uint32_t> primitive;
     std::vector<uint8_t> occluded;
 
     void resize(size_t count) {
         for (std::vector<float> *array :
-             {&direction[0], &direction[1], &direction[2], &t_min, &t_max, &t, &cosine})
+             {&direction[0], &direction[1], &direction[2], &t, &cosine})
             array->resize(count);
         primitive.resize(count);
         occluded.resize(count);
     }
 
-    RayGroup group(Vec3f origin) const {
+    RayGroup group(Vec3f origin, float t_min, float t_max) const {
         RayGroup group;
         group.count = uint32_t(t.size());
         group.has_common_origin = true;
         group.common_origin = origin;
         for (int k = 0; k < 3; ++k)
             group.direction[k] = direction[k].data();
-        group.t_min = t_min.data();
-        group.t_max = t_max.data();
+        group.t_min = IntervalEnds::of_all(t_min);
+        group.t_max = IntervalEnds::of_all(t_max);
         return group;
     }
 };
@@ -73,19 +75,20 @@ public:
 
     void trace_primary(const RayTile &tile) {
         rays_.resize(size_t(tile.side) * tile.side);
+        const PrimaryDirections directions(view_);
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
             const Block block = block_of(tile, i, view_);
             const size_t first = size_t(i) * PACKET_WIDTH;
-            store_vectors(first, primary_directions(view_, block));
-            store(&rays_.t_min[first], FloatPacket(view_.near_clip));
-            store(&rays_.t_max[first], in_lanes(block.on_film, view_.far_clip));
+            store_vectors(first, directions(block), block.on_film);
         }
         const uint32_t grid = view_.grid;
         const CameraTile square{view_.camera,          tile.x / grid, tile.y / grid,
                                 tile.side / grid,      grid * grid,   0.5f / float(grid),
                                 1 - 0.5f / float(grid)};
-        trace_closest(tree_, rays_.group(view_.camera.origin), options_,
-                      {rays_.t.data(), rays_.primitive.data()}, counters_, &square);
+        const RayGroup group =
+            rays_.group(view_.camera.origin, view_.near_clip, view_.far_clip);
+        trace_closest(tree_, group, options_, {rays_.t.data(), rays_.primitive.data()},
+                      counters_, &square);
     }
 
     // Shades the hits as if all of them saw the light.
@@ -104,19 +107,14 @@ public:
         for (uint32_t i = 0; i < tile.block_count(); ++i) {
             const size_t first = size_t(i) * PACKET_WIDTH;
             const LaneBits hit = hits(first);
-            if (hit == 0) {
-                store(&rays_.cosine[first], FloatPacket(0.0f));
-                store(&rays_.t_max[first], FloatPacket(0.0f));
-                continue;
-            }
-            const Shading shading = shaded(first, hit);
-            store_vectors(first, shading.from_light);
+            Shading shading{};
+            if (hit != 0)
+                shading = shaded(first, hit);
+            store_vectors(first, shading.from_light, hit);
             store(&rays_.cosine[first], in_lanes(hit, shading.cosine));
-            store(&rays_.t_min[first], FloatPacket(SHADOW_EPSILON));
-            store(&rays_.t_max[first], in_lanes(hit, 1 - SHADOW_EPSILON));
         }
-        trace_any(tree_, rays_.group(view_.light), options_, rays_.occluded.data(),
-                  counters_);
+        trace_any(tree_, rays_.group(view_.light, SHADOW_EPSILON, 1 - SHADOW_EPSILON),
+                  options_, rays_.occluded.data(), counters_);
     }
 
     void write_lit(const RayTile &tile, const FrameOutput &output) {
@@ -147,9 +145,10 @@ private:
                     output);
     }
 
-    void store_vectors(size_t first, const Vec3<FloatPacket> &vectors) {
+    // Directions of the active rays of a block.
+    void store_vectors(size_t first, const Vec3<FloatPacket> &vectors, LaneBits active) {
         for (int k = 0; k < 3; ++k)
-            store(&rays_.direction[k][first], vectors[k]);
+            store(&rays_.direction[k][first], in_lanes(active, vectors[k], NAN));
     }
     Vec3<FloatPacket> load_vectors(size_t first) const {
         return {load<FloatPacket>(&rays_.direction[0][first]),

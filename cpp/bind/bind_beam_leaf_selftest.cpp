@@ -67,14 +67,12 @@ public:
 private:
     RaysUnderTest(const Rows &directions, float t_min, float t_max) {
         group_.count = uint32_t(directions.shape(0));
-        t_min_.assign(group_.count, t_min);
-        t_max_.assign(group_.count, t_max);
         for (int k = 0; k < 3; ++k) {
             direction_[k] = column(directions, k);
             group_.direction[k] = direction_[k].data();
         }
-        group_.t_min = t_min_.data();
-        group_.t_max = t_max_.data();
+        group_.t_min = IntervalEnds::of_all(t_min);
+        group_.t_max = IntervalEnds::of_all(t_max);
     }
 
     static std::vector<float> column(const Rows &rows, int k) {
@@ -84,7 +82,7 @@ private:
         return values;
     }
 
-    std::vector<float> origin_[3], direction_[3], t_min_, t_max_;
+    std::vector<float> origin_[3], direction_[3];
     RayGroup group_;
 };
 

@@ -2,6 +2,7 @@
 
 #include "base/check.h"
 #include "base/morton.h"
+#include "base/reciprocal_estimate.h"
 #include "base/simd.h"
 #include "traverse/load_packet.h"
 
@@ -82,9 +83,10 @@ struct PacketRange {
     Range of_all_lanes() const { return {least_lane(lo), greatest_lane(hi)}; }
 };
 
-// Two roundings to single precision and those of what follows, and quotients that
-// underflow.
-constexpr double WIDEN_QUOTIENT = 0x1p-22, SMALLEST_QUOTIENT = 0x1p-120;
+// An estimate of a reciprocal, a rounding to single precision and those of what follows,
+// and quotients that underflow.
+constexpr double WIDEN_QUOTIENT = 0x1p-21, SMALLEST_QUOTIENT = 0x1p-120;
+static_assert(WIDEN_QUOTIENT > 1.5 * RECIPROCAL_ESTIMATE_ERROR);
 
 // Bounds of what the active rays of a group have, sixteen rays at a time.
 class RayBounds {
@@ -103,10 +105,10 @@ public:
         }
         // Not a number: left out by minimum() and maximum().
         const FloatPacket none(std::numeric_limits<float>::quiet_NaN());
-        const FloatPacket one(1.0f);
         for (int k = 0; k < 3; ++k)
             d[k] = select(active, d[k], none);
-        const Vec3<FloatPacket> r{one / d.x, one / d.y, one / d.z};
+        const Vec3<FloatPacket> r =
+            by_axis([&](int k) { return reciprocal_estimate(d[k]); });
         for (int k = 0; k < 3; ++k) {
             extent_[k].add(d[k]);
             for (int step = 1; step < 3; ++step) {
@@ -117,13 +119,13 @@ public:
                 origin_[k].add(select(
                     active, load_padded(rays.origin[k], first, first + count), none));
         }
-        t_min_.add(select(active, t_min, none));
-        t_max_.add(select(active, t_max, none));
+        greatest_t_min_ = maximum(select(active, t_min, none), greatest_t_min_);
+        greatest_t_max_ = maximum(select(active, t_max, none), greatest_t_max_);
     }
 
     // A negative t_min counts as zero.
-    double greatest_t_min() const { return std::max(t_min_.of_all_lanes().hi, 0.0); }
-    double greatest_t_max() const { return t_max_.of_all_lanes().hi; }
+    double greatest_t_min() const { return std::max(greatest_lane(greatest_t_min_), 0.0f); }
+    double greatest_t_max() const { return greatest_lane(greatest_t_max_); }
     std::array<Range, 3> extent() const { return of_all_lanes(extent_); }
     std::array<Range, 3> origin() const { return of_all_lanes(origin_); }
 
@@ -158,7 +160,7 @@ private:
     bool has_common_origin_;
     std::array<PacketRange, 3> extent_, origin_;
     std::array<std::array<PacketRange, 3>, 3> slope_;
-    PacketRange t_min_, t_max_;
+    FloatPacket greatest_t_min_ = -INFINITY, greatest_t_max_ = -INFINITY;
 };
 
 // The same slopes in double precision, for directions of any size.
@@ -301,6 +303,11 @@ CameraRays camera_rays(const RayGroup &rays, const CameraTile &tile) {
     CameraRays camera{tile, 0, -INFINITY, false};
     if (rays.count == 0)
         return camera;
+    if (!rays.t_min.each() && !rays.t_max.each()) {
+        const float t_min = std::max(rays.t_min.common(), 0.0f);
+        const float t_max = rays.t_max.common();
+        return t_min < t_max ? CameraRays{tile, t_min, t_max, true} : camera;
+    }
     FloatPacket greatest_t_min(0.0f), greatest_t_max(-INFINITY);
     const FloatPacket first_t_min(rays.t_min[0]), first_t_max(rays.t_max[0]);
     MaskOf<FloatPacket> alike = true;

@@ -102,7 +102,7 @@ void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
     packet.u = component(axes[0]) * reciprocal;
     packet.v = component(axes[1]) * reciprocal;
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    set_ends(packet, mlrt::load<FloatPacket>(rays.t_max + packet.first_ray), main);
+    set_ends(packet, load_padded(rays.t_max, packet.first_ray, rays.count), main);
     unloaded &= ~(uint64_t(1) << number);
 }
 

@@ -140,8 +140,10 @@ RegroupedRays::RegroupedRays(const RayGroup &rays, const RayNumbers &numbers)
             store(&direction[k][i], gather(rays.direction[k], from));
         for (int k = 0; k < 3 && !rays.has_common_origin; ++k)
             store(&origin[k][i], gather(rays.origin[k], from));
-        store(&t_min[i], gather(rays.t_min, from));
-        store(&t_max[i], gather(rays.t_max, from));
+        if (rays.t_min.each())
+            store(&t_min[i], gather(rays.t_min.each(), from));
+        if (rays.t_max.each())
+            store(&t_max[i], gather(rays.t_max.each(), from));
         store(&number[i], from);
     }
 }
@@ -154,8 +156,10 @@ RayGroup RegroupedRays::group(const RayGroup &from) {
         if (!from.has_common_origin)
             group.origin[k] = origin[k].data();
     }
-    group.t_min = t_min.data();
-    group.t_max = t_max.data();
+    if (from.t_min.each())
+        group.t_min = t_min.data();
+    if (from.t_max.each())
+        group.t_max = t_max.data();
     if (from.cost) {
         std::fill_n(cost.begin(), count, 0.0f);
         group.cost = cost.data();

@@ -59,7 +59,7 @@ private:
 struct RegroupedRays {
     std::array<std::array<float, RayNumbers::CAPACITY>, 3> direction;
     std::array<std::array<float, RayNumbers::CAPACITY>, 3> origin; // unless it is common
-    std::array<float, RayNumbers::CAPACITY> t_min, t_max;
+    std::array<float, RayNumbers::CAPACITY> t_min, t_max; // unless they are the same
     std::array<float, RayNumbers::CAPACITY> cost;
     std::array<uint32_t, RayNumbers::CAPACITY> number;
     uint32_t count;

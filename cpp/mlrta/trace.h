@@ -20,7 +20,8 @@ enum class Traversal : uint32_t {
     interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005,
                  // section 3.3)
     beam_leaf,   // X4: beams of up to 1024 rays, if they have a common origin or, where any
-                 // hit will do, a common direction; else X2
+                 // hit will do, a common direction or not much between where they begin and
+                 // end; else X2
     wide,     // through the wide tree, as packets where rays have a common origin and one
               // at a time else; X1 if it has not been made
     adaptive, // X4 as long as it pays; for rays that go alone the wide tree if it has been

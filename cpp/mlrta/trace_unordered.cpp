@@ -2,6 +2,7 @@
 
 #include "mlrta/parallel_rays.h"
 #include "mlrta/ray_order.h"
+#include "mlrta/shaft_tracer.h"
 
 #include <algorithm>
 #include <optional>
@@ -11,7 +12,7 @@ namespace mlrt {
 
 namespace {
 
-bool may_be_sorted(const RayGroup &rays, const TraceOptions &options) {
+bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
     return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
            (options.traversal == Traversal::beam_leaf ||
             options.traversal == Traversal::adaptive);
@@ -32,14 +33,13 @@ void put_back(const std::vector<uint32_t> &numbers, const std::vector<Value> &or
         values[numbers[i]] = ordered[i];
 }
 
-// Copies of the rays of a group in an order of their own.
+// Copies of rays of a group in an order of their own.
 struct OrderedRays {
     std::vector<float> origin[3], direction[3], t_min, t_max;
     RayGroup group;
 
-    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers)
-        : t_min(in_order(numbers, rays.t_min)), t_max(in_order(numbers, rays.t_max)),
-          group(rays) {
+    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers) : group(rays) {
+        group.count = uint32_t(numbers.size());
         for (int k = 0; k < 3; ++k) {
             direction[k] = in_order(numbers, rays.direction[k]);
             group.direction[k] = direction[k].data();
@@ -48,12 +48,31 @@ struct OrderedRays {
                 group.origin[k] = origin[k].data();
             }
         }
-        group.t_min = t_min.data();
-        group.t_max = t_max.data();
+        if (rays.t_min.each()) {
+            t_min = in_order(numbers, rays.t_min.each());
+            group.t_min = t_min.data();
+        }
+        if (rays.t_max.each()) {
+            t_max = in_order(numbers, rays.t_max.each());
+            group.t_max = t_max.data();
+        }
     }
     OrderedRays(const OrderedRays &) = delete;
     OrderedRays &operator=(const OrderedRays &) = delete;
 };
+
+void trace_any_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
+                      uint8_t *occluded, Counters &counters) {
+    const RayOrder order(rays);
+    if (!order.pays()) {
+        trace_any(tree, rays, options, occluded, counters);
+        return;
+    }
+    const OrderedRays ordered(rays, order.numbers());
+    std::vector<uint8_t> found(rays.count);
+    trace_any(tree, ordered.group, options, found.data(), counters);
+    put_back(order.numbers(), found, occluded);
+}
 
 } // namespace
 
@@ -68,7 +87,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters) {
     std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options))
+    if (may_be_regrouped(rays, options))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -88,18 +107,25 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
 void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
                          const TraceOptions &options, uint8_t *occluded,
                          Counters &counters) {
-    std::optional<RayOrder> order;
-    if (may_be_sorted(rays, options) && !are_parallel(rays))
-        order.emplace(rays);
-    if (!order || !order->pays()) {
+    if (!may_be_regrouped(rays, options) || are_parallel(rays)) {
         trace_any(tree, rays, options, occluded, counters);
         return;
     }
-    const std::vector<uint32_t> &numbers = order->numbers();
-    const OrderedRays ordered(rays, numbers);
-    std::vector<uint8_t> found(rays.count);
-    trace_any(tree, ordered.group, options, found.data(), counters);
-    put_back(numbers, found, occluded);
+    if (rays.has_common_origin) {
+        trace_any_sorted(tree, rays, options, occluded, counters);
+        return;
+    }
+    const std::vector<uint32_t> left = ShaftTracer(tree, rays, counters).trace(occluded);
+    if (left.size() == rays.count) {
+        trace_any_sorted(tree, rays, options, occluded, counters);
+        return;
+    }
+    if (left.empty())
+        return;
+    const OrderedRays others(rays, left);
+    std::vector<uint8_t> found(left.size());
+    trace_any_sorted(tree, others.group, options, found.data(), counters);
+    put_back(left, found, occluded);
 }
 
 } // namespace mlrt

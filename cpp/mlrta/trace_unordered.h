@@ -11,8 +11,9 @@ namespace mlrt {
 // As many rays as are best handed over at once.
 uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays);
 
-// Both sort the rays if that makes beams of neighbours much narrower. Others stay in their
-// order, and so do those whose costs are asked for.
+// Both sort the rays if that makes beams of neighbours much narrower, and the second one
+// takes runs of them through shafts before. Those whose costs are asked for stay in their
+// order.
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
                              const TraceOptions &options, HitGroup hits,
                              Counters &counters);

@@ -31,8 +31,6 @@ void BsdfRays::reserve(size_t size) {
         for (std::vector<float> *array : {&start_[k], &p_[k], &direction_[k], &weight_[k]})
             array->resize(size);
     density_.resize(size);
-    t_min_.resize(size, 0.0f);
-    t_max_.resize(size, std::numeric_limits<float>::max());
     primitive_.resize(size);
     blocked_.resize(size);
     if (scene_.data.objects) {
@@ -62,8 +60,7 @@ RayGroup BsdfRays::group(float *cost) {
         rays.origin[k] = start_[k].data();
         rays.direction[k] = direction_[k].data();
     }
-    rays.t_min = t_min_.data();
-    rays.t_max = t_max_.data();
+    rays.t_max = IntervalEnds::of_all(std::numeric_limits<float>::max());
     if (cost) {
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();

@@ -65,7 +65,7 @@ private:
     // One array a component, with room for a packet behind the last entry.
     std::vector<uint32_t> ray_;
     std::vector<float> start_[3], p_[3], direction_[3], weight_[3];
-    std::vector<float> density_, t_min_, t_max_, cost_;
+    std::vector<float> density_, cost_;
     // What the rays meet; distances and instances only if the scene has objects.
     std::vector<uint32_t> primitive_, instance_;
     std::vector<float> t_;

@@ -114,8 +114,6 @@ void CameraSamples::lay_out(const PixelGroup &group) {
     first_stream_.resize(padded);
     for (AlignedVector<uint32_t> *array : {&seed_, &stream_})
         array->resize(streams_.in_one_pass() ? BLOCK : padded);
-    t_min_.assign(padded, scene_.plane.near_clip);
-    t_max_.assign(padded, scene_.plane.far_clip);
     for (size_t ray = 0; ray < padded; ++ray) {
         const size_t last = std::min(ray, count_ - 1);
         const Pixel offset = group.offsets[last / sample_count_];

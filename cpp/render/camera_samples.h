@@ -31,12 +31,10 @@ public:
     // Arrays of one entry a ray, in the order of the group, and of whole packets; entries
     // behind the last ray are rays of some pixel of the group.
     size_t count() const { return count_; }
-    size_t padded_count() const { return t_min_.size(); }
+    size_t padded_count() const { return column_.size(); }
     const float *direction(int axis) const { return direction_[axis].data(); }
     // Where rays begin, if they do not all begin at the camera's origin.
     const float *origin(int axis) const { return origin_[axis].data(); }
-    const float *t_min() const { return t_min_.data(); }
-    const float *t_max() const { return t_max_.data(); }
     // Positions on the film: any value if they are not wanted.
     const float *film_x() const { return film_x_.data(); }
     const float *film_y() const { return film_y_.data(); }
@@ -92,7 +90,7 @@ private:
     std::vector<BsdfNumbers> bsdf_;
     std::vector<NumberPair> pairs_;       // in the order in which they are drawn
     std::vector<NumberPair> block_pairs_; // the same of a block
-    AlignedVector<float> origin_[3], direction_[3], t_min_, t_max_;
+    AlignedVector<float> origin_[3], direction_[3];
 };
 
 } // namespace mlrt

@@ -19,8 +19,6 @@ void TileRenderer::pass_hidden_emitters() {
         for (int k = 0; k < 3; ++k)
             for (const uint32_t ray : passing.ray)
                 d[k].push_back(samples_.direction(k)[ray]);
-        const std::vector<float> t_min(count, 0.0f);
-        const std::vector<float> t_max(count, std::numeric_limits<float>::max());
         Hits hits;
         hits.primitive.resize(count);
         if (scene_.data.objects) {
@@ -34,8 +32,7 @@ void TileRenderer::pass_hidden_emitters() {
             group.origin[k] = passing.origin[k].data();
             group.direction[k] = d[k].data();
         }
-        group.t_min = t_min.data();
-        group.t_max = t_max.data();
+        group.t_max = IntervalEnds::of_all(std::numeric_limits<float>::max());
         trace(group, nullptr, scene_.data.objects ? hits.t.data() : nullptr,
               hits.primitive.data(), hits.instance.data());
         for (size_t first = 0; first < count; first += PACKET_WIDTH)

@@ -38,8 +38,6 @@ void ShadowRays::reserve(size_t size) {
         origin_[k].resize(from_light_ ? 0 : size);
         direction_[k].resize(size);
     }
-    t_min_.resize(size, begin_);
-    t_max_.resize(size, end_);
     occluded_.resize(size);
 }
 
@@ -81,8 +79,8 @@ void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &optio
         rays.origin[k] = from_light_ ? nullptr : origin_[k].data();
         rays.direction[k] = direction_[k].data();
     }
-    rays.t_min = t_min_.data();
-    rays.t_max = t_max_.data();
+    rays.t_min = IntervalEnds::of_all(begin_);
+    rays.t_max = IntervalEnds::of_all(end_);
     if (cost) {
         cost_.assign(count_, 0.0f);
         rays.cost = cost_.data();

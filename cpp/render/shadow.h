@@ -57,7 +57,7 @@ private:
     AlignedVector<uint32_t> ray_;
     AlignedVector<float> origin_[3]; // if the rays do not start at the light
     AlignedVector<float> direction_[3];
-    AlignedVector<float> t_min_, t_max_, cost_;
+    AlignedVector<float> cost_;
     AlignedVector<uint8_t> occluded_;
     // What was added at once: the lanes have light, and neighbouring entries above.
     struct Packet {

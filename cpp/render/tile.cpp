@@ -83,8 +83,8 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
         rays.origin[k] = samples_.origin(k);
         rays.direction[k] = samples_.direction(k);
     }
-    rays.t_min = samples_.t_min();
-    rays.t_max = samples_.t_max();
+    rays.t_min = IntervalEnds::of_all(scene_.plane.near_clip);
+    rays.t_max = IntervalEnds::of_all(scene_.plane.far_clip);
     rays.cost = target_.cost ? cost_.data() : nullptr;
 
     const PixelRect &sampled = target_.film.sampled();

@@ -25,6 +25,17 @@ inline FloatPacket load_padded(const float *values, uint32_t first, uint32_t cou
     return load_first(values + first, count - first);
 }
 
+// The same; what lies past `count` is inactive, since both ends of its interval are zero.
+inline FloatPacket load_padded(const IntervalEnds &ends, uint32_t first, uint32_t count) {
+    if (ends.each())
+        return load_padded(ends.each(), first, count);
+    const FloatPacket common(ends.common());
+    if (first + PACKET_WIDTH <= count)
+        return common;
+    return select(from_bits<FloatPacket>(first_lanes(count - first)), common,
+                  FloatPacket(0.0f));
+}
+
 template <typename Origin>
 LoadedPacket<Origin> load_packet(const RayGroup &group, uint32_t first) {
     // Reciprocals of what is moderate are moderate, and so are parameters of planes.

@@ -8,6 +8,29 @@
 
 namespace mlrt {
 
+// Where the intervals of a group's rays begin, or where they end: each of them somewhere
+// else, or all at one parameter.
+class IntervalEnds {
+public:
+    IntervalEnds() = default;
+    IntervalEnds(const float *each) : each_(each) {}
+    static IntervalEnds of_all(float common) {
+        IntervalEnds ends;
+        ends.common_ = common;
+        return ends;
+    }
+
+    // The array, or null if there is one value for all rays, which is common().
+    const float *each() const { return each_; }
+    float common() const { return common_; }
+
+    float operator[](uint32_t i) const { return each_ ? each_[i] : common_; }
+
+private:
+    const float *each_ = nullptr;
+    float common_ = 0;
+};
+
 // Rays {origin + t * direction, t_min < t <= t_max}, one array a component. Directions need
 // not have unit length; t is in units of the direction. Nothing behind the origin is hit: a
 // negative t_min counts as zero. A ray with t_max <= t_min is inactive: it costs nothing
@@ -29,8 +52,7 @@ struct RayGroup {
     const float *origin[3]{};
 
     const float *direction[3]{};
-    const float *t_min = nullptr;
-    const float *t_max = nullptr;
+    IntervalEnds t_min, t_max;
 
     // If given, what tracing takes is added here for each ray: nodes that are visited and
     // triangles that are tested, shared equally by rays for which that is done together. It
