@@ -110,8 +110,8 @@ nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray 
     const PacketFrustum frustum(packet.rays, packet.main_axis, packet.side);
     const BlockVolumes volumes(coordinates_of(eight), frustum.axes, frustum.origin,
                                frustum.side);
-    const BlockVolumes::Seen seen = volumes.seen_by(load<FloatPacket>(frustum.slopes[0]),
-                                                    load<FloatPacket>(frustum.slopes[1]));
+    const BlockVolumes::Seen seen = volumes.seen_by(FloatPacket(frustum.slopes[0][0]),
+                                                    FloatPacket(frustum.slopes[1][0]));
     constexpr LaneBits ONE = (1u << BLOCK_WIDTH) - 1; // the first one of two equal rays
     Eight nearest{}, farthest{};
     if (seen.possible != 0) {

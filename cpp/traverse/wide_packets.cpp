@@ -8,9 +8,11 @@
 #include "traverse/take_turns.h"
 #include "traverse/wide_entry.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 namespace mlrt {
 
@@ -167,6 +169,13 @@ private:
     // By the contract of triangle_test.h: makes it the best hit, if it is.
     void decide(uint32_t ray, const Triangle &triangle, uint32_t primitive,
                 bool certainly_hit, const Triangle *triangles, Counters &counters) {
+        const uint32_t rival = best_[ray];
+        // Of an equal triangle all is known.
+        if (rival != NO_PRIMITIVE &&
+            std::memcmp(&triangle, &triangles[rival], sizeof(Triangle)) == 0) {
+            best_[ray] = std::min(primitive, rival);
+            return;
+        }
         const Vec3f o = rays_->origin.point, d = rays_->lane_direction(ray);
         if (!certainly_hit) {
             const HitDecision decision = decide_hit(o, d, triangle);
@@ -178,7 +187,7 @@ private:
         const float t = hit_distance(o, d, triangle);
         if (!(t > rays_->t_min.entry(ray) && t < INFINITE))
             return;
-        if (const uint32_t rival = best_[ray]; rival == NO_PRIMITIVE) {
+        if (rival == NO_PRIMITIVE) {
             if (t > rays_->t_max.entry(ray))
                 return;
         } else {
