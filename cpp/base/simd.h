@@ -311,20 +311,6 @@ Packet load_halves(const Value *low, const Value *high) {
     return Packet(drjit::load<Half>(low), drjit::load<Half>(high));
 }
 
-// The same eight values in lanes 0 to 7 and 8 to 15.
-inline FloatPacket load_twice(const float *values) {
-#if defined(__AVX512F__)
-    return FloatPacket(_mm512_broadcast_f32x8(_mm256_loadu_ps(values)));
-#else
-    return load_halves<FloatPacket>(values, values);
-#endif
-}
-
-// One value in lanes 0 to 7, another one in lanes 8 to 15.
-inline FloatPacket in_halves(float low, float high) {
-    return FloatPacket(FloatBlock(low), FloatBlock(high));
-}
-
 // A value a lane in memory, for what is computed or looked up lane by lane.
 template <typename Value>
 struct alignas(64) LaneArray : std::array<Value, PACKET_WIDTH> {};

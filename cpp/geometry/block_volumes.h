@@ -8,6 +8,7 @@
 // sign together.
 #pragma once
 
+#include "base/block_pair.h"
 #include "base/magnitude.h"
 #include "base/simd.h"
 #include "base/vec.h"

@@ -1,6 +1,7 @@
 #include "traverse/wide_packets.h"
 
 #include "base/block_order.h"
+#include "base/block_pair.h"
 #include "geometry/block_volumes.h"
 #include "geometry/triangle_test.h"
 #include "traverse/packet_frustum.h"
