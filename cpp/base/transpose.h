@@ -56,6 +56,56 @@ load_columns(const std::array<const float *, PACKET_WIDTH> &rows) {
     return columns;
 }
 
+// Four values of each of sixteen rows, which begin `stride` apart, as columns: result[i]
+// holds value i of each row.
+inline std::array<FloatPacket, 4> load_four_columns(const float *rows, size_t stride) {
+#if defined(__AVX512F__)
+    // Rows i, i + 4, i + 8 and i + 12.
+    const auto four_rows = [&](size_t i) {
+        const auto row = [&](size_t j) { return _mm_loadu_ps(rows + (i + j) * stride); };
+        __m512 four = _mm512_castps128_ps512(row(0));
+        four = _mm512_insertf32x4(four, row(4), 1);
+        four = _mm512_insertf32x4(four, row(8), 2);
+        return _mm512_insertf32x4(four, row(12), 3);
+    };
+    const __m512 a = four_rows(0), b = four_rows(1), c = four_rows(2), d = four_rows(3);
+    const __m512 ab = _mm512_unpacklo_ps(a, b), cd = _mm512_unpacklo_ps(c, d);
+    const __m512 ab_high = _mm512_unpackhi_ps(a, b), cd_high = _mm512_unpackhi_ps(c, d);
+    constexpr int LOWER = _MM_SHUFFLE(1, 0, 1, 0), UPPER = _MM_SHUFFLE(3, 2, 3, 2);
+    return {FloatPacket(_mm512_shuffle_ps(ab, cd, LOWER)),
+            FloatPacket(_mm512_shuffle_ps(ab, cd, UPPER)),
+            FloatPacket(_mm512_shuffle_ps(ab_high, cd_high, LOWER)),
+            FloatPacket(_mm512_shuffle_ps(ab_high, cd_high, UPPER))};
+#elif defined(__AVX__)
+    // Rows i and i + 4.
+    const auto two_rows = [&](size_t i) {
+        const auto row = [&](size_t j) { return _mm_loadu_ps(rows + (i + j) * stride); };
+        return _mm256_insertf128_ps(_mm256_castps128_ps256(row(0)), row(4), 1);
+    };
+    const auto eight_rows = [&](size_t first) -> std::array<FloatBlock, 4> {
+        const __m256 a = two_rows(first), b = two_rows(first + 1);
+        const __m256 c = two_rows(first + 2), d = two_rows(first + 3);
+        const __m256 ab = _mm256_unpacklo_ps(a, b), cd = _mm256_unpacklo_ps(c, d);
+        const __m256 ab_high = _mm256_unpackhi_ps(a, b), cd_high = _mm256_unpackhi_ps(c, d);
+        constexpr int LOWER = _MM_SHUFFLE(1, 0, 1, 0), UPPER = _MM_SHUFFLE(3, 2, 3, 2);
+        return {FloatBlock(_mm256_shuffle_ps(ab, cd, LOWER)),
+                FloatBlock(_mm256_shuffle_ps(ab, cd, UPPER)),
+                FloatBlock(_mm256_shuffle_ps(ab_high, cd_high, LOWER)),
+                FloatBlock(_mm256_shuffle_ps(ab_high, cd_high, UPPER))};
+    };
+    const std::array<FloatBlock, 4> low = eight_rows(0), high = eight_rows(8);
+    return {FloatPacket(low[0], high[0]), FloatPacket(low[1], high[1]),
+            FloatPacket(low[2], high[2]), FloatPacket(low[3], high[3])};
+#else
+    std::array<LaneArray<float>, 4> columns;
+    for (size_t row = 0; row < PACKET_WIDTH; ++row)
+        for (size_t i = 0; i < 4; ++i)
+            columns[i][row] = rows[row * stride + i];
+    return {load<FloatPacket>(columns[0]), load<FloatPacket>(columns[1]),
+            load<FloatPacket>(columns[2]), load<FloatPacket>(columns[3])};
+#endif
+}
+
 // Sixteen packets, and a value of each.
 using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
 

@@ -7,6 +7,7 @@
 #include "render/face_cache.h"
 #include "render/film_blocks.h"
 #include "render/picture_film.h"
+#include "render/picture_memory.h"
 #include "render/sampler.h"
 #include "render/shadow_offset.h"
 #include "render/shadow_segment.h"
@@ -250,6 +251,7 @@ void bind_render_selftest(nb::module_ &m) {
           "Numbers of one sample; drawn: 2 for each pair, 1 for a number that is dropped.");
     s.def("camera_direction", &camera_direction, nb::arg("camera"), nb::arg("film"),
           nb::arg("x"), nb::arg("y"));
+    s.def("kept_picture_bytes", &kept_picture_bytes);
     s.def("filter_weights", &filter_weights, nb::arg("film"), nb::arg("distances"));
     s.def("accumulate", &accumulate, nb::arg("film"), nb::arg("samples"));
     s.def("picture", &picture, nb::arg("film"), nb::arg("samples_per_pixel"),

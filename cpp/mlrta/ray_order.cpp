@@ -113,7 +113,8 @@ bool RayOrder::is_scattered() const {
     return sides / runs > WIDER * 2 * square_side;
 }
 
-// A counting sort in two steps of ten bits each, lower ones first.
+// A counting sort in steps of ten bits each, lower ones first: two, or one if there are no
+// more bits.
 void RayOrder::sort(uint32_t dropped_bits) {
     constexpr uint32_t CELLS = 1u << CELL_BITS;
     const float side = std::max(width_, height_);
@@ -125,7 +126,7 @@ void RayOrder::sort(uint32_t dropped_bits) {
                    dropped_bits;
     numbers_.resize(count_);
     std::iota(numbers_.begin(), numbers_.end(), 0u);
-    for (const uint32_t shift : {0u, CELL_BITS}) {
+    for (uint32_t shift = 0; shift < 2 * CELL_BITS - dropped_bits; shift += CELL_BITS) {
         const auto digit = [&](uint32_t ray) { return codes[ray] >> shift & (CELLS - 1); };
         std::array<uint32_t, CELLS + 1> next{};
         for (const uint32_t ray : numbers_)

@@ -114,15 +114,19 @@ void CameraSamples::lay_out(const PixelGroup &group) {
     first_stream_.resize(padded);
     for (AlignedVector<uint32_t> *array : {&seed_, &stream_})
         array->resize(streams_.in_one_pass() ? BLOCK : padded);
-    for (size_t ray = 0; ray < padded; ++ray) {
-        const size_t last = std::min(ray, count_ - 1);
-        const Pixel offset = group.offsets[last / sample_count_];
+    size_t ray = 0;
+    const auto add_ray = [&](Pixel offset, uint32_t sample) {
         column_[ray] = float(offset.column);
         row_[ray] = float(offset.row);
-        first_stream_[ray] =
+        first_stream_[ray++] =
             (offset.row * sampled_.width + offset.column) * streams_.samples_per_pixel() +
-            uint32_t(last % sample_count_);
-    }
+            sample;
+    };
+    for (const Pixel offset : group.offsets)
+        for (uint32_t sample = 0; sample < sample_count_; ++sample)
+            add_ray(offset, sample);
+    while (ray < padded)
+        add_ray(group.offsets.back(), sample_count_ - 1);
     std::fill(seed_.begin(), seed_.end(), streams_.stream(0, 0).seed);
 }
 

@@ -87,11 +87,34 @@ void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
     if (scene_.all_emitters_are_points) // in place, too
         new (&packet.light) EmitterSample<FloatPacket>(
             sample_chosen_points(scene_, packet.choices, packet.lanes, packet.point.p));
+    else if (samples_at_once())
+        sample_lights(packet, of_rays(packet.hit, samples_.light_y(sample)));
+}
+
+// Of the emitters that the lanes chose, whichever they are.
+void TileRenderer::sample_lights(ShadedPacket &packet, const FloatPacket &y) {
+    const EmitterChoices &choices = packet.choices;
+    const auto light_of = [&](uint32_t emitter) {
+        return sample_chosen(scene_, emitter, choices, packet.point.p, y);
+    };
+    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(packet.lanes)));
+    new (&packet.light) EmitterSample<FloatPacket>(light_of(first));
+    const LaneBits others = packet.lanes & ~to_bits(choices.emitter == UIntPacket(first));
+    for_each_value(choices.emitter, others, [&](uint32_t emitter, LaneBits holders) {
+        const EmitterSample<FloatPacket> light = light_of(emitter);
+        const auto mask = from_bits<FloatPacket>(holders);
+        for (int k = 0; k < 3; ++k) {
+            packet.light.weight[k] = select(mask, light.weight[k], packet.light.weight[k]);
+            packet.light.direction[k] =
+                select(mask, light.direction[k], packet.light.direction[k]);
+            packet.light.target[k] = select(mask, light.target[k], packet.light.target[k]);
+        }
+    });
 }
 
 void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sample) {
     const EmitterChoices &choices = packet.choices;
-    if (scene_.all_emitters_are_points) {
+    if (samples_at_once()) {
         if (packet.lanes != 0)
             add_light(packet, packet.lanes, packet.light, choices.emitter);
         return;
@@ -103,7 +126,19 @@ void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sampl
     });
 }
 
-// Of the emitters that the lanes chose, all of them points if they are several.
+// Of the emitters that the given lanes chose: mostly the same for all there are.
+FloatPacket TileRenderer::factors_of(const UIntPacket &emitters, LaneBits lanes) const {
+    FloatPacket factors(factors_[0]);
+    if (!factors_differ_)
+        return factors;
+    for_each_value(emitters, lanes, [&](uint32_t emitter, LaneBits holders) {
+        factors = select(from_bits<FloatPacket>(holders), FloatPacket(factors_[emitter]),
+                         factors);
+    });
+    return factors;
+}
+
+// Of the emitters that the lanes chose. With robust offsets several must all be points.
 void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
                              const EmitterSample<FloatPacket> &light,
                              const UIntPacket &emitters) {
@@ -114,11 +149,11 @@ void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
     lanes &= not_black(light.weight) & to_bits(cos_light > zero);
     if (lanes == 0)
         return;
+    const FloatPacket share = factors_of(emitters, lanes) * cos_light;
+    const Vec3<FloatPacket> reflected = (packet.albedo * share) * light.weight;
     const auto append = [&](uint32_t emitter, LaneBits lit,
                             const ShadowSegment<FloatPacket> &segment) {
-        const FloatPacket share = FloatPacket(factors_[emitter]) * cos_light;
-        shadows_[emitter].append(lit, hit, segment.start, segment.target,
-                                 (packet.albedo * share) * light.weight);
+        shadows_[emitter].append(lit, hit, segment.start, segment.target, reflected);
     };
     if (offset_ == ShadowOffset::mitsuba) {
         const ShadowSegment<FloatPacket> segment = mitsuba_segment(point, light);

@@ -64,16 +64,11 @@ FacesOf<Real> all_of(uint32_t face) {
     }
 }
 
-// Mitsuba's rectangle.cpp and mesh.cpp, sample_position.
+// Mitsuba's mesh.cpp, sample_position.
 template <typename Real>
-AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
-                            const EmitterTable &table, const Real &x, const Real &y) {
-    const Shape &shape = scene.data.shapes[emitter.shape];
-    if (emitter.rectangle)
-        return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
-                    y * spread<Real>(emitter.edge_v),
-                spread<Real>(table.normal), all_of<Real>(shape.first_face)};
-
+[[gnu::noinline]] AreaPoint<Real> sample_mesh(const PreparedScene &scene,
+                                              const Shape &shape, const EmitterTable &table,
+                                              const Real &x, const Real &y) {
     AreaPoint<Real> point;
     FacesOf<Real> &faces = point.face;
     const Real reused = choose_face(table, shape.first_face, y, faces);
@@ -96,6 +91,15 @@ AreaPoint<Real> sample_area(const PreparedScene &scene, const Emitter &emitter,
     if (shape.flip_normals)
         point.normal = -point.normal;
     return point;
+}
+
+// Mitsuba's rectangle.cpp, sample_position.
+template <typename Real>
+AreaPoint<Real> sample_rectangle(const Emitter &emitter, const Shape &shape,
+                                 const EmitterTable &table, const Real &x, const Real &y) {
+    return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
+                y * spread<Real>(emitter.edge_v),
+            spread<Real>(table.normal), all_of<Real>(shape.first_face)};
 }
 
 // A point of an analytic shape that glows, with its density by solid angle.
@@ -152,8 +156,9 @@ from_point(const PointLight<Real> &light, const Real &choice_weight, const Vec3<
             point.direction, light.position, all_of<Real>(NONE)};
 }
 
-EmitterSample<float> from_projector(const PreparedScene &scene, uint32_t number,
-                                    float choice_weight, const Vec3f &p) {
+[[gnu::noinline]] EmitterSample<float> from_projector(const PreparedScene &scene,
+                                                      uint32_t number, float choice_weight,
+                                                      const Vec3f &p) {
     const Emitter &emitter = scene.data.emitters[number];
     EmitterSample<float> sample;
     sample.target = emitter.position;
@@ -164,9 +169,9 @@ EmitterSample<float> from_projector(const PreparedScene &scene, uint32_t number,
                     choice_weight;
     return sample;
 }
-EmitterSample<FloatPacket> from_projector(const PreparedScene &scene, uint32_t number,
-                                          const FloatPacket &choice_weight,
-                                          const Vec3<FloatPacket> &p) {
+[[gnu::noinline]] EmitterSample<FloatPacket>
+from_projector(const PreparedScene &scene, uint32_t number,
+               const FloatPacket &choice_weight, const Vec3<FloatPacket> &p) {
     EmitterSample<FloatPacket> samples;
     samples.target = spread<FloatPacket>(scene.data.emitters[number].position);
     samples.target_face = all_of<FloatPacket>(NONE);
@@ -183,8 +188,8 @@ EmitterSample<FloatPacket> from_projector(const PreparedScene &scene, uint32_t n
 }
 
 // Mitsuba's constant.cpp and envmap.cpp, sample_direction.
-Environment::Samples sample_environment(const PreparedScene &scene, const FloatPacket &x,
-                                        const FloatPacket &y) {
+[[gnu::noinline]] Environment::Samples
+sample_environment(const PreparedScene &scene, const FloatPacket &x, const FloatPacket &y) {
     return scene.environment.sample(x, y);
 }
 struct OneEnvironmentSample {
@@ -204,6 +209,61 @@ Real way_out(const PreparedScene &scene, const Vec3<Real> &p) {
     return Real(2.0f) * maximum(Real(scene.radius), length(p - spread<Real>(scene.center)));
 }
 
+// The arguments and the result of the next two are those of sample_one.
+template <typename Real>
+[[gnu::noinline]] EmitterSample<Real>
+from_analytic(const PreparedScene &scene, const AnalyticShape &analytic, uint32_t number,
+              const Real &choice_weight, const Vec3<Real> &p, const Real &x, const Real &y,
+              Real *density) {
+    const Emitter &emitter = scene.data.emitters[number];
+    const AnalyticLight<Real> light = sample_analytic(scene, analytic, number, p, x, y);
+    const Real factor = choice_weight / light.density;
+    if (density)
+        *density = light.density / choice_weight;
+    return {by_axis([&](int k) {
+                return select(light.is_lit, factor * emitter.radiance[k], Real(0.0f));
+            }),
+            light.direction, light.p,
+            all_of<Real>(scene.data.shapes[emitter.shape].first_face)};
+}
+
+// Of a shape that has an area.
+template <typename Real>
+EmitterSample<Real> from_surface(const PreparedScene &scene, uint32_t number,
+                                 const Real &choice_weight, const Vec3<Real> &p,
+                                 const Real &x, const Real &y, Real *density) {
+    const Emitter &emitter = scene.data.emitters[number];
+    const EmitterTable &table = scene.emitter_tables[number];
+    const Shape &shape = scene.data.shapes[emitter.shape];
+    const Real zero(0.0f), one(1.0f);
+    AreaPoint<Real> point;
+    Real by_area(table.inverse_area);
+    Vec3<Real> radiance = spread<Real>(emitter.radiance);
+    if (emitter.radiance_texture != NONE) {
+        const LightPoint<Real> chosen = sample_textured_light(scene, number, x, y);
+        point = {chosen.p, chosen.normal, all_of<Real>(shape.first_face)};
+        by_area = chosen.density;
+        radiance = chosen.radiance;
+    } else if (emitter.rectangle) {
+        point = sample_rectangle(emitter, shape, table, x, y);
+    } else {
+        point = sample_mesh(scene, shape, table, x, y);
+    }
+    const Vec3<Real> to_light = point.p - p;
+    const Real squared = dot(to_light, to_light);
+    const Vec3<Real> direction = to_light * (one / square_root(squared));
+    const Real cosine = dot(direction, point.normal);
+    const Real by_direction = by_area * (squared / -cosine);
+    // False also for a point on the light itself, where the direction is not a number.
+    const MaskOf<Real> has_light =
+        (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
+    const Real factor = choice_weight / by_direction;
+    if (density)
+        *density = by_direction / choice_weight;
+    return {by_axis([&](int k) { return select(has_light, factor * radiance[k], zero); }),
+            direction, point.p, point.face};
+}
+
 // Light of one emitter; choice_weight is 1 / the probability that it was chosen. `density`
 // as in sample_chosen.
 template <typename Real>
@@ -212,28 +272,21 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
                                const Real &x, const Real &y, Real *density = nullptr) {
     const Emitter &emitter = scene.data.emitters[number];
     const EmitterTable &table = scene.emitter_tables[number];
-    const Real zero(0.0f), one(1.0f);
     EmitterSample<Real> sample;
     sample.target_face = all_of<Real>(NONE);
-    MaskOf<Real> has_light(true);
-    Real factor = zero, by_direction(INFINITY);
-    Vec3<Real> radiance = spread<Real>(emitter.radiance);
-
+    if (density)
+        *density = Real(INFINITY);
     switch (emitter.type) {
     case EmitterType::point:
     case EmitterType::spot:
-        if (density)
-            *density = Real(INFINITY);
         return from_point(light_for(table.point, choice_weight), choice_weight, p);
     case EmitterType::projector:
-        if (density)
-            *density = Real(INFINITY);
         return from_projector(scene, number, choice_weight, p);
     case EmitterType::directional: {
         // Mitsuba's directional.cpp.
         sample.target = p - way_out(scene, p) * spread<Real>(emitter.direction);
         sample.direction = spread<Real>(-emitter.direction);
-        factor = choice_weight;
+        sample.weight = choice_weight * spread<Real>(emitter.radiance);
         break;
     }
     case EmitterType::constant:
@@ -244,54 +297,18 @@ EmitterSample<Real> sample_one(const PreparedScene &scene, uint32_t number,
         sample.weight = choice_weight * weight;
         if (density)
             *density = by_direction / choice_weight;
-        return sample;
+        break;
     }
     case EmitterType::area: {
         if (!(table.inverse_area > 0))
             return {spread<Real>({}), spread<Real>({}), spread<Real>({}),
                     all_of<Real>(NONE)};
         const AnalyticShape *analytic = scene.analytic(scene.data.shapes[emitter.shape]);
-        if (analytic && emitter.radiance_texture == NONE) {
-            const AnalyticLight<Real> light =
-                sample_analytic(scene, *analytic, number, p, x, y);
-            sample.target = light.p;
-            sample.target_face = all_of<Real>(scene.data.shapes[emitter.shape].first_face);
-            sample.direction = light.direction;
-            has_light = light.is_lit;
-            factor = choice_weight / light.density;
-            by_direction = light.density;
-            break;
-        }
-        AreaPoint<Real> point;
-        Real by_area(table.inverse_area);
-        if (emitter.radiance_texture != NONE) {
-            const LightPoint<Real> chosen = sample_textured_light(scene, number, x, y);
-            point = {chosen.p, chosen.normal,
-                     all_of<Real>(scene.data.shapes[emitter.shape].first_face)};
-            by_area = chosen.density;
-            radiance = chosen.radiance;
-        } else {
-            point = sample_area(scene, emitter, table, x, y);
-        }
-        const Vec3<Real> to_light = point.p - p;
-        const Real squared = dot(to_light, to_light);
-        const Real distance = square_root(squared);
-        sample.target = point.p;
-        sample.target_face = point.face;
-        sample.direction = to_light * (one / distance);
-        const Real cosine = dot(sample.direction, point.normal);
-        by_direction = by_area * (squared / -cosine);
-        // False also for a point on the light itself, where the direction is not a number.
-        has_light =
-            (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
-        factor = choice_weight / by_direction;
-        break;
+        if (analytic && emitter.radiance_texture == NONE)
+            return from_analytic(scene, *analytic, number, choice_weight, p, x, y, density);
+        return from_surface(scene, number, choice_weight, p, x, y, density);
     }
     }
-    if (density)
-        *density = by_direction / choice_weight;
-    for (int k = 0; k < 3; ++k)
-        sample.weight[k] = select(has_light, factor * radiance[k], zero);
     return sample;
 }
 

@@ -69,6 +69,7 @@ private:
     }
     void write_pixels(const PixelGroup &group, const float *const *values);
     void write_square(const PixelGroup &group, const float *const *values);
+    void write_means(const PixelGroup &group, const float *const *values);
     void add_whole_pixels(const PixelGroup &group, const float *const *values);
 
     Film film_;

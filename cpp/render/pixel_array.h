@@ -1,10 +1,10 @@
 // Memory for a picture.
 #pragma once
 
-#include "base/huge_array.h"
+#include "render/picture_memory.h"
 
 #include <cstddef>
-#include <cstdlib>
+#include <cstdint>
 #include <memory>
 #include <type_traits>
 #include <utility>
@@ -12,9 +12,11 @@
 namespace mlrt {
 
 struct PixelDelete {
+    uint64_t bytes = 0;
+
     template <typename T>
     void operator()(T *values) const {
-        std::free(values);
+        give_back_picture_memory(values, bytes);
     }
 };
 
@@ -31,8 +33,9 @@ class PixelArray {
 public:
     PixelArray() = default;
     explicit PixelArray(size_t size)
-        : values_(size > 0 ? static_cast<T *>(allocate_aligned(size * sizeof(T)))
-                           : nullptr),
+        : values_(size > 0 ? static_cast<T *>(take_picture_memory(size * sizeof(T)))
+                           : nullptr,
+                  PixelDelete{size * sizeof(T)}),
           size_(size) {}
 
     T *data() { return values_.get(); }

@@ -1,12 +1,14 @@
 #include "render/render.h"
 
 #include "base/parallel.h"
+#include "render/ray_options.h"
 #include "render/work_items.h"
 
 #include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -38,28 +40,12 @@ FilmTarget film_target(RenderResult &result) {
     return target;
 }
 
-// Rays without a common origin that go through the scene, if every sample hits something.
-double rays_alone(const PreparedScene &scene, const RenderSettings &settings,
-                  double samples) {
-    const double of_emitters =
-        scene.all_emitters_are_points ? 0 : settings.sampling.emitter_samples;
-    const uint32_t bsdf_samples = settings.sampling.bsdf_samples;
-    const double of_bsdfs =
-        bsdf_samples > 0 && looks_for_light_first(scene) ? 0 : bsdf_samples;
-    return samples * (of_emitters + of_bsdfs);
-}
-
-// Makes the wide tree for a picture that asks for it, or if it is worth it. Returns whether
-// it was not cancelled.
-bool widen(const PreparedScene &scene, const RenderSettings &settings, double samples,
-           const std::function<bool()> &cancelled) {
-    const KdTree &tree = *scene.data.tree;
-    if (settings.trace.traversal == Traversal::wide)
-        return tree.widening->make(tree, cancelled) != nullptr;
-    if (settings.trace.traversal == Traversal::adaptive)
-        return tree.widening->make_for(tree, uint64_t(rays_alone(scene, settings, samples)),
-                                       cancelled);
-    return true;
+// A tile, unless there would be too few of them for all threads to have work.
+uint32_t rays_per_group(const TraceOptions &options, double samples) {
+    constexpr double ENOUGH_GROUPS = 16; // chosen
+    constexpr double LARGE_BEAM = 1024;  // smaller groups would cut beams short
+    const double tile = double(options.initial_tile) * options.initial_tile;
+    return uint32_t(std::min(tile, std::max(LARGE_BEAM, samples / ENOUGH_GROUPS)));
 }
 
 } // namespace
@@ -73,14 +59,16 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
     const PixelRect &sampled = picture.sampled();
     const SampleStreams streams(settings.seed, sampled.width * sampled.height,
                                 settings.samples_per_pixel);
-    const uint32_t side = settings.trace.initial_tile;
-    const WorkItems items(sampled, settings.samples_per_pixel, side * side);
+    const double all_samples =
+        double(sampled.width) * sampled.height * settings.samples_per_pixel;
+    const WorkItems items(sampled, settings.samples_per_pixel,
+                          rays_per_group(settings.trace, all_samples));
     const TileTarget target{picture, ChannelNumbers(settings.aovs), result.primitive.data(),
                             result.cost.data()};
 
-    const double all_samples =
-        double(sampled.width) * sampled.height * settings.samples_per_pixel;
-    if (!widen(scene, settings, all_samples, [&] { return cancelled && cancelled(0); }))
+    const std::optional<RayOptions> options = prepare_rays(
+        scene, settings, all_samples, [&] { return cancelled && cancelled(0); });
+    if (!options)
         return false;
     std::atomic<uint64_t> samples_done{0};
     std::atomic<bool> stop{false};
@@ -97,8 +85,7 @@ bool render(const PreparedScene &scene, const RenderSettings &settings,
         const std::lock_guard lock(tiles_mutex);
         if (idle_tiles.empty())
             return std::make_unique<TileRenderer>(scene, streams, settings.sampling,
-                                                  settings.trace, settings.shadow_offset,
-                                                  target);
+                                                  *options, settings.shadow_offset, target);
         std::unique_ptr<TileRenderer> tile = std::move(idle_tiles.back());
         idle_tiles.pop_back();
         return tile;

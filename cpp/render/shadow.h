@@ -26,6 +26,8 @@ class ShadowRays {
 public:
     ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset);
 
+    bool from_light() const { return from_light_; }
+
     void clear() { count_ = packet_count_ = 0; }
 
     // Adds the lanes whose bit is set: `light` reaches the point `from`, which lies off its

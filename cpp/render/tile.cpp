@@ -13,7 +13,7 @@
 namespace mlrt {
 
 TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                           const Sampling &sampling, const TraceOptions &options,
+                           const Sampling &sampling, const RayOptions &options,
                            ShadowOffset offset, TileTarget target)
     : scene_(scene), streams_(streams),
       // One is as good as many where the numbers make no difference.
@@ -36,6 +36,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
                 ? float(emitter_samples_) / float(sampling.emitter_samples)
                 : float(emitter_samples_);
         factors_.push_back(std::numbers::inv_pi_v<float> / shared_by);
+        factors_differ_ |= factors_.back() != factors_.front();
     }
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);
@@ -104,7 +105,9 @@ void TileRenderer::trace_camera_rays(const PixelGroup &group) {
 // Instances are written only if the scene has objects, and distances are needed then.
 void TileRenderer::trace(const RayGroup &rays, const CameraTile *tile, float *t,
                          uint32_t *primitive, uint32_t *instance) {
-    trace_closest(*scene_.data.tree, rays, options_, HitGroup{t, primitive},
+    const TraceOptions &options =
+        rays.has_common_origin ? options_.together : options_.alone;
+    trace_closest(*scene_.data.tree, rays, options, HitGroup{t, primitive},
                   counters_.primary, tile);
     if (scene_.data.objects)
         trace_closest_objects(*scene_.data.objects, rays, {t, primitive, instance},
@@ -230,9 +233,10 @@ void TileRenderer::add_reflected_light() {
     const std::array<float *, 3> colours{values_[0].data(), values_[1].data(),
                                          values_[2].data()};
     for (ShadowRays &shadow : shadows_)
-        shadow.trace(scene_.data, options_, counters_.shadow, cost, colours);
+        shadow.trace(scene_.data, shadow.from_light() ? options_.together : options_.alone,
+                     counters_.shadow, cost, colours);
     if (bsdf_rays_)
-        bsdf_rays_->trace(options_, counters_.bsdf, cost, colours);
+        bsdf_rays_->trace(options_.alone, counters_.bsdf, cost, colours);
 }
 
 // Mitsuba's moment.cpp: CIE XYZ of the colours (spectrum.h, srgb_to_xyz), and the squares.

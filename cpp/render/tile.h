@@ -75,6 +75,11 @@ struct Sampling {
     uint32_t bsdf_samples = 0;
 };
 
+// How rays with a common origin go through the scene, and how others do.
+struct RayOptions {
+    TraceOptions together, alone;
+};
+
 // A packet on its way from surfaces to shadow rays.
 struct ShadedPacket {
     HitPacket hit;
@@ -83,13 +88,14 @@ struct ShadedPacket {
     FloatPacket cos_view;
     Vec3<FloatPacket> albedo;
     EmitterChoices choices;
-    EmitterSample<FloatPacket> light; // if all emitters are points
+    // If all lanes are sampled at once: faces any, unless all choose the same emitter.
+    EmitterSample<FloatPacket> light;
 };
 
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
-                 const Sampling &sampling, const TraceOptions &options, ShadowOffset offset,
+                 const Sampling &sampling, const RayOptions &options, ShadowOffset offset,
                  TileTarget target);
     TileRenderer(const TileRenderer &) = delete;
     TileRenderer &operator=(const TileRenderer &) = delete;
@@ -115,8 +121,16 @@ private:
     // In emitter_light.cpp: packets of which hits and points are known.
     void shade(std::span<ShadedPacket> packets);
     void find_reflectance(ShadedPacket &packet);
+    // Whether all lanes of a packet are, whichever emitters they choose. Robust offsets ask
+    // what each sample lies on.
+    bool samples_at_once() const {
+        return offset_ == ShadowOffset::mitsuba || scene_.all_emitters_are_points ||
+               scene_.data.emitters.size() == 1;
+    }
     void choose_light(ShadedPacket &packet, uint32_t sample);
+    void sample_lights(ShadedPacket &packet, const FloatPacket &y);
     void add_emitter_sample(const ShadedPacket &packet, uint32_t sample);
+    FloatPacket factors_of(const UIntPacket &emitters, LaneBits lanes) const;
     void add_light(const ShadedPacket &packet, LaneBits lanes,
                    const EmitterSample<FloatPacket> &light, const UIntPacket &emitters);
     // In bsdf_light.cpp.
@@ -146,7 +160,8 @@ private:
     const SampleStreams &streams_;
     uint32_t emitter_samples_;
     std::vector<float> factors_; // of the cosine, one an emitter
-    TraceOptions options_;
+    bool factors_differ_ = false;
+    RayOptions options_;
     ShadowOffset offset_;
     TileTarget target_;
     RenderCounters counters_;

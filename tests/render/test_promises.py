@@ -69,6 +69,18 @@ def test_picture_does_not_depend_on_options(folder: Path, name: str) -> None:
     assert len(set(pictures.values())) == 1
 
 
+@pytest.mark.parametrize("samples", [1, 4, 6, 16, 20])
+def test_picture_does_not_depend_on_groups(folder: Path, samples: int) -> None:
+    # Whole pixels are summed side by side where they fill squares, else one by one, and
+    # in parts if a tile holds less than a pixel's samples.
+    scene = core_scene(render_scenes.SCENES["several"](folder))
+    pictures = [
+        all_pictures(core.render(scene, samples, 1, {"initial_tile": tile}, AOVS))
+        for tile in (1, 2, 4, 16, 64, 128)
+    ]
+    assert len(set(pictures)) == 1
+
+
 @pytest.mark.parametrize("name", ["several", "gaussian border", "crop", "mirrored sky"])
 @pytest.mark.parametrize("samples", [1, 4, 16])
 def test_beams_bounded_by_the_film_leave_the_picture_as_it_is(
