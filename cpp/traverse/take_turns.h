@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <memory>
 
 namespace mlrt {
 
@@ -22,7 +23,9 @@ template <typename Walk, size_t AT_ONCE, typename Start, typename VisitBlock,
           typename Finish>
 void take_turns(const WideTree &tree, size_t count, Counters &counters, Start &&start,
                 VisitBlock &&visit_block, Finish &&finish) {
-    std::array<Walk, AT_ONCE> walks;
+    // Too much for the stacks of some threads.
+    thread_local const auto memory = std::make_unique<std::array<Walk, AT_ONCE>>();
+    std::array<Walk, AT_ONCE> &walks = *memory;
     std::array<Walk *, AT_ONCE> running;
     size_t started = 0;
     for (; started < std::min(AT_ONCE, count); ++started) {
