@@ -3,7 +3,7 @@
 #include "bind/bind.h"
 #include "bind/build_options.h"
 #include "bind/triangle_arrays.h"
-#include "geometry/block_forms.h"
+#include "geometry/block_volumes.h"
 #include "geometry/sheared_volumes.h"
 #include "kdtree/builder.h"
 #include "kdtree/wide_maker.h"
@@ -12,6 +12,7 @@
 #include "traverse/wide_packets.h"
 #include "traverse/wide_rays.h"
 
+#include <algorithm>
 #include <cstring>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
@@ -90,8 +91,8 @@ std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &directio
     return {volumes.certain_hits(), volumes.certain_misses()};
 }
 
-// What block forms tell of the ray: bits of possible and certain hits, bounds of the depths
-// of the former, and the axis that these are measured along.
+// What block volumes tell of the ray: bits of possible and certain hits, bounds of the
+// depths of the former, and the axis that these are measured along.
 nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray &eight) {
     const float zero = 0, one = 1;
     RayGroup group;
@@ -107,16 +108,63 @@ nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray 
         throw nb::value_error("a moderate direction");
     packet.choose_axis(1);
     const PacketFrustum frustum(packet.rays, packet.main_axis, packet.side);
-    const BlockForms forms(coordinates_of(eight), frustum.axes, frustum.origin,
-                           frustum.greatest_sum);
-    const BlockForms::Seen seen =
-        forms.seen_by(frustum.slopes[0].entry(0), frustum.slopes[1].entry(0), frustum.side);
+    const BlockVolumes volumes(coordinates_of(eight), frustum.axes, frustum.origin,
+                               frustum.side);
+    const BlockVolumes::Seen seen = volumes.seen_by(FloatPacket(frustum.slopes[0][0]),
+                                                    FloatPacket(frustum.slopes[1][0]));
+    constexpr LaneBits ONE = (1u << BLOCK_WIDTH) - 1; // the first one of two equal rays
     Eight nearest{}, farthest{};
     if (seen.possible != 0) {
-        store(nearest.data(), seen.nearest);
-        store(farthest.data(), seen.farthest);
+        std::copy_n(to_lanes<float>(seen.nearest).begin(), BLOCK_WIDTH, nearest.begin());
+        std::copy_n(to_lanes<float>(seen.farthest).begin(), BLOCK_WIDTH, farthest.begin());
     }
-    return nb::make_tuple(seen.possible, seen.certain, nearest, farthest, packet.main_axis);
+    return nb::make_tuple(seen.possible & ONE, seen.certain & ONE, nearest, farthest,
+                          packet.main_axis);
+}
+
+// Rays from one point, and eight boxes (lower and upper corner, and one more that does not
+// count): the rays that go along with the middle one; the boxes that any of those may
+// enter; for each box those of them that may enter it; and for each ray the boxes that it
+// may enter alone.
+nb::tuple entered_boxes(const Point &origin, const TriangleArray &directions,
+                        const TriangleArray &corners) {
+    if (directions.shape(0) > PACKET_WIDTH || corners.shape(0) != BLOCK_WIDTH)
+        throw nb::value_error("sixteen rays at most, and eight boxes");
+    std::array<std::array<float, PACKET_WIDTH>, 3> direction{};
+    std::array<float, PACKET_WIDTH> zero{}, one;
+    one.fill(1);
+    RayGroup group;
+    group.count = uint32_t(directions.shape(0));
+    group.has_common_origin = true;
+    group.common_origin = {origin[0], origin[1], origin[2]};
+    for (size_t k = 0; k < 3; ++k) {
+        for (size_t i = 0; i < group.count; ++i)
+            direction[k][i] = directions(i, 0, k);
+        group.direction[k] = direction[k].data();
+    }
+    group.t_min = zero.data();
+    group.t_max = one.data();
+    WideNode node{};
+    for (size_t i = 0; i < BLOCK_WIDTH; ++i)
+        for (size_t face = 0; face < 6; ++face)
+            node.faces[face][i] = corners(i, face / 3, face % 3);
+
+    WidePacket packet{load_packet<CommonOrigin>(group, 0).rays, 0, 0, 1};
+    if (packet.rays.active == 0)
+        throw nb::value_error("a moderate direction");
+    const LaneBits along = packet.choose_axis(packet.rays.active);
+    packet.rays.active = along;
+    const PacketFrustum frustum(packet.rays, packet.main_axis, packet.side);
+    SeenBoxes boxes;
+    const uint32_t by_all = to_bits(frustum.entered_by(along, node, boxes));
+    std::array<uint32_t, BLOCK_WIDTH> rays;
+    for (uint32_t i = 0; i < BLOCK_WIDTH; ++i)
+        rays[i] = along & frustum.entering(boxes, i, FloatPacket(INFINITE));
+    std::array<uint32_t, PACKET_WIDTH> alone{};
+    for_each_lane(along, [&](uint32_t lane) {
+        alone[lane] = to_bits(frustum.entered_by(1u << lane, node, boxes));
+    });
+    return nb::make_tuple(along, by_all, rays, alone);
 }
 
 } // namespace
@@ -130,6 +178,7 @@ void bind_wide_selftest(nb::module_ &m) {
           nb::arg("options"));
     s.def("decided", &decided);
     s.def("seen", &seen);
+    s.def("entered_boxes", &entered_boxes);
     s.attr("max_wide_depth") = MAX_WIDE_DEPTH;
 }
 

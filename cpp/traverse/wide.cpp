@@ -4,6 +4,7 @@
 #include "geometry/sheared_volumes.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
+#include "traverse/take_turns.h"
 
 #include <array>
 #include <bit>
@@ -141,39 +142,11 @@ template <Query QUERY>
 void trace(const WideTree &tree, const WideRays &rays, Hit *hits, Counters &counters) {
     constexpr size_t AT_ONCE = 8; // chosen from 1 to 16 by incoherent rays in conference
     using Walk = WideWalk<QUERY>;
-    std::array<Walk, AT_ONCE> walks;
-    std::array<Walk *, AT_ONCE> running;
-    size_t count = 0;
     uint32_t started = 0;
-    while (count < AT_ONCE && started < rays.count) {
-        running[count] = &walks[count];
-        running[count++]->start(tree, rays, started++);
-    }
-    // Whether a walk goes on, and where to, was known a round ago: to wait for that where
-    // it is computed would keep the others waiting.
-    while (count > 0) {
-        std::array<Walk *, AT_ONCE> at_node, at_block;
-        size_t nodes = 0, blocks = 0;
-        for (size_t i = 0; i < count;) {
-            Walk &walk = *running[i];
-            if (walk.next(tree)) {
-                (walk.is_at_block() ? at_block[blocks++] : at_node[nodes++]) = &walk;
-                ++i;
-                continue;
-            }
-            hits[walk.number()] = walk.hit();
-            if (started < rays.count)
-                walk.start(tree, rays, started++);
-            else
-                running[i] = running[--count];
-        }
-        for (size_t i = 0; i < nodes; ++i)
-            at_node[i]->visit_node(tree);
-        for (size_t i = 0; i < blocks; ++i)
-            at_block[i]->visit_block(tree, counters);
-        counters.traversal_steps += nodes + blocks;
-        counters.leaf_visits += blocks;
-    }
+    take_turns<Walk, AT_ONCE>(
+        tree, rays.count, counters, [&](Walk &walk) { walk.start(tree, rays, started++); },
+        [&](Walk &walk) { walk.visit_block(tree, counters); },
+        [&](const Walk &walk) { hits[walk.number()] = walk.hit(); });
 }
 
 } // namespace

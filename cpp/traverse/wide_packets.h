@@ -1,8 +1,9 @@
 // Packets of rays with a common origin through the wide tree: for dense scans, where
 // neighbouring rays enter the same nodes but hit different triangles.
 //
-// A packet visits a node once for all of its rays, as long as more than a few enter it, and
-// tests a block ray by ray, eight triangles at a time.
+// A packet visits a node once for all of its rays that enter it, and tests a block for two
+// of them at a time, with eight triangles. Packets that are next to each other go through
+// the top of the tree together.
 #pragma once
 
 #include "base/counters.h"

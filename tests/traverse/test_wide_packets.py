@@ -200,3 +200,42 @@ def test_beams_are_not_tried_again_and_again_where_they_lose(core: ModuleType) -
     assert 0 < 2 * beams < fallbacks
     closest(tree, rays, ADAPTIVE).assert_same(expected)
     np.testing.assert_array_equal(occluded(tree, rays, ADAPTIVE), expected.face >= 0)
+
+
+def lattice() -> tuple[Scene, Rays]:
+    """A layer of triangles with corners at integers, and 48 x 48 rays from an integer point
+    to corners and middles of edges: all of them run in faces of boxes."""
+    side = 33
+    y, x = np.mgrid[0:side, 0:side]
+    vertices = np.stack([x, y, 16 + (x * y) % 3], axis=-1).reshape(-1, 3)
+    corner = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    lower = np.stack([corner, corner + 1, corner + side], axis=1)
+    upper = np.stack([corner + 1, corner + side + 1, corner + side], axis=1)
+    steps = np.arange(48) / 2
+    targets = np.stack(np.meshgrid(steps, steps, [16.0]), axis=-1).reshape(-1, 3)
+    directions = targets - [16, 8, 0]
+    # Squares of 4 x 4 neighbours.
+    row, column = np.divmod(np.arange(len(directions)), 48)
+    order = np.lexsort([column % 4, row % 4, column // 4, row // 4])
+    origin = np.tile(np.float32([16, 8, 0]), (len(directions), 1))
+    scene = vertices.astype(np.float32), np.concatenate([lower, upper]).astype(np.uint32)
+    return scene, (origin, directions[order].astype(np.float32))
+
+
+@each_core
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("side", [-1, 1])
+def test_same_hits_along_faces_of_boxes(core: ModuleType, axis: int, side: int) -> None:
+    (vertices, faces), (origins, directions) = lattice()
+
+    def turned(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+        return np.ascontiguousarray(np.roll(points, axis, axis=1) * np.float32(side))
+
+    tree = build(core, (turned(vertices), faces))
+    tree.widen()
+    rays = turned(origins), turned(directions)
+    assert assert_same_hits(tree, rays, 0, np.inf) > 1500
+    first = closest(tree, rays, BRUTE_FORCE)
+    t = np.where(first.face < 0, np.float32(1), first.t)
+    assert_same_hits(tree, rays, 0, t)
+    assert_same_hits(tree, rays, t, np.inf)
