@@ -30,7 +30,7 @@ class Options:
     """The build options of the core, by the same names."""
 
     traversal_cost: float = 1.0
-    intersection_cost: float = 0.125
+    intersection_cost: float = 0.25
     empty_bonus: float = 0.8
     clip: bool = True
     rule_empty_cell: bool = True

@@ -104,6 +104,8 @@ private:
         const float spent = float(counters_.beam_triangles - before) / float(active);
         if (packets_.knows_wide_tree())
             judge(done, spent);
+        else if (done && spent > DENSE)
+            tree_.widening->miss(active); // rays that had better go apart
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)

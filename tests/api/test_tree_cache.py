@@ -84,7 +84,7 @@ def test_what_changes_the_tree_misses_the_cache(
         assert len(files(cache)) == count
     for path, options in arguments:
         assert "load_tree" in prepare(path, tree_cache=cache, **options).timings
-    same = {"intersection_cost": 0.125, "clip": True}
+    same = {"intersection_cost": 0.25, "clip": True}
     assert "load_tree" in prepare(arguments[0][0], tree_cache=cache, **same).timings
 
 

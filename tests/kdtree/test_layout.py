@@ -59,11 +59,11 @@ def test_the_report_counts_what_is_there(tree: BuiltTree) -> None:
     assert report["max_leaf_count"] == max(tree.count[leaf] for leaf in leaves)
     assert report["references"] == len(tree.references)
     assert report["depth"] == tree.depth == max(v.depth for v in visits)
-    # K_T = 1 for an inner node and K_I = 0.125 for a reference, by the chance to enter it.
+    # K_T = 1 for an inner node and K_I = 0.25 for a reference, by the chance to enter it.
     cost = sum(
         v.area
         / visits[0].area
-        * (0.125 * int(tree.count[v.node]) if tree.is_leaf(v.node) else 1.0)
+        * (0.25 * int(tree.count[v.node]) if tree.is_leaf(v.node) else 1.0)
         for v in visits
     )
     assert report["sah_cost"] == pytest.approx(cost, rel=1e-9)

@@ -121,7 +121,7 @@ def test_a_tree_that_is_one_leaf() -> None:
     report = KdTree(*triangle).report
     assert report["expected_traversals"] == 0
     assert report["expected_leaf_visits"] == report["expected_primitive_visits"] == 1
-    assert report["sah_cost"] == 0.125
+    assert report["sah_cost"] == 0.25
     assert report["flat_leaves"] == report["leaves"] == 1
 
 
