@@ -75,8 +75,8 @@ void ShaftTracer::trace_run(uint32_t first, uint32_t count) {
         trace_run(first + i, std::min(part, count - i));
 }
 
-// A hit may lie beyond the end of its interval by a rounding of its parameter, and the end
-// is computed with two.
+// A hit may lie beyond the end of its interval by a rounding of its parameter, which is not
+// a small share of one that is denormal, and the end is computed with two.
 std::optional<Shaft> ShaftTracer::shaft_of(uint32_t first, uint32_t count) {
     PointBounds begin, end;
     active_ = 0;
@@ -94,7 +94,7 @@ std::optional<Shaft> ShaftTracer::shaft_of(uint32_t first, uint32_t count) {
         const LaneBits lanes = to_bits(active);
         active_ += uint32_t(std::popcount(lanes));
         begin.add(lanes, o);
-        end.add(lanes, o + t_max * d);
+        end.add(lanes, o + latest_distance(t_max) * d);
     }
     const Box3f from = begin.box();
     Box3f to = end.box();

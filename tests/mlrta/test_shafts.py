@@ -140,6 +140,24 @@ def test_ends_just_at_hits_at_any_scale(core: ModuleType, exponent: int) -> None
 
 
 @each_core
+@pytest.mark.parametrize("exponent", [60, 119, 127])
+def test_ends_that_are_the_smallest_number(core: ModuleType, exponent: int) -> None:
+    """Distances up to 1.5 times the smallest number round to it, and hits there count."""
+    smallest = 2.0**-149
+    aside = np.linspace(0, 1e-3, 32)[:, None] * [1, 0, 0]
+    origins = (aside * 2.0**exponent * smallest).astype(np.float32)
+    # Not parallel.
+    directions = ((aside + [0, 0, 1]) * 2.0**exponent).astype(np.float32)
+    for share, stops in ((0.75, True), (1.25, True), (1.45, True), (1.75, False)):
+        sheet = np.float64([[-1, -1, share], [2, -1, share], [-1, 2, share]])
+        vertices = (sheet * 2.0**exponent * smallest).astype(np.float32)
+        tree = build(core, (vertices, np.array([[0, 1, 2]], np.uint32)))
+        for options in (BRUTE_FORCE, BEAM_LEAF, ADAPTIVE):
+            found = occluded(tree, (origins, directions), options, t_max=smallest)
+            np.testing.assert_array_equal(found, stops, f"{options} {share}")
+
+
+@each_core
 def test_rays_that_are_no_numbers_or_go_nowhere_or_on_for_ever(core: ModuleType) -> None:
     rng = np.random.default_rng(SEED)
     tree = build(core, workloads.soup(rng, 4, 0.8))
