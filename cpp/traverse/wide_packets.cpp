@@ -49,9 +49,9 @@ public:
         begin_ = to_lanes<float>(maximum(rays_->t_min, FloatPacket(SMALLEST_DISTANCE)) *
                                      size * (1 + WIDEN_DEPTH) +
                                  LEAST_DEPTH);
-        const FloatPacket end = rays_->t_max * size;
-        best_from_ = to_lanes<float>(end * (1 - WIDEN_DEPTH) - LEAST_DEPTH);
-        best_to_ = to_lanes<float>(end * (1 + WIDEN_DEPTH) + LEAST_DEPTH);
+        best_from_ = to_lanes<float>(rays_->t_max * size * (1 - WIDEN_DEPTH) - LEAST_DEPTH);
+        best_to_ = to_lanes<float>(
+            latest_distance(rays_->t_max) * size * (1 + WIDEN_DEPTH) + LEAST_DEPTH);
         best_.fill(NO_PRIMITIVE);
         depth_ = 0;
         entered_ = searching_;

@@ -98,6 +98,26 @@ def test_same_hits_in_huge_and_tiny_scenes(core: ModuleType, power: int) -> None
     assert assert_brute_force(rng, core, scene, 200) > 100, SEED
 
 
+@each_core
+@pytest.mark.parametrize("exponent", [45, 60])
+def test_ends_that_are_the_smallest_number(core: ModuleType, exponent: int) -> None:
+    """Distances up to 1.5 times the smallest number round to it, and hits there count."""
+    smallest = 2.0**-149
+    directions = np.tile(np.float32([0, 0, 2.0**exponent]), (32, 1))
+    directions[:, 0] = np.linspace(0, 1e-3, 32) * 2.0**exponent
+    rays = np.zeros_like(directions), directions
+    for share, stops in ((0.75, True), (1.25, True), (1.45, True), (1.75, False)):
+        sheet = np.float64([[-1, -1, share], [2, -1, share], [-1, 2, share]])
+        vertices = (sheet * 2.0**exponent * smallest).astype(np.float32)
+        tree = build(core, (vertices, np.array([[0, 1, 2]], np.uint32)))
+        tree.widen()
+        for options in (BRUTE_FORCE, WIDE, ADAPTIVE):
+            hits = closest(tree, rays, options, 0, smallest)
+            np.testing.assert_array_equal(hits.face == 0, stops, f"{options} {share}")
+            found = occluded(tree, rays, options, 0, smallest)
+            np.testing.assert_array_equal(found, stops, f"{options} {share}")
+
+
 def layers(rng: np.random.Generator) -> Scene:
     """Copies of some triangles, a few roundings nearer or farther along the rays from the
     origin, in any order: which one is nearest cannot be told in single precision."""
