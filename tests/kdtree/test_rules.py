@@ -158,6 +158,9 @@ def test_no_cell_below_the_area_floor_is_split() -> None:
 
 def test_clipping_saves_references() -> None:
     vertices, faces = workloads.sphere(4)
-    clipped, not_clipped = (BuiltTree(vertices[faces], clip=c) for c in (True, False))
+    # In large leaves more depends on where cells cease to be split.
+    clipped, not_clipped = (
+        BuiltTree(vertices[faces], clip=c, intersection_cost=1.5) for c in (True, False)
+    )
     assert clipped.report["references"] < not_clipped.report["references"]
     assert clipped.report["sah_cost"] < not_clipped.report["sah_cost"]
