@@ -87,7 +87,7 @@ public:
                    hi = maximum(a_.z, maximum(b_.z, c_.z));
         const Real slack = fused(error * absolute(reciprocal), (hi - lo) * 8.5f,
                                  fused(depth_, Real(24 * FLOAT_ROUNDOFF), Real(UNDERFLOW)));
-        // Where nothing is known of the depth it is not a number.
+        // Where nothing is known of the depth it is not a number: the vertices remain.
         seen.nearest = maximum(depth - slack, lo) * (1 - WIDEN_DEPTH);
         seen.farthest = minimum(depth + slack, hi) * (1 + WIDEN_DEPTH);
         return seen;
