@@ -147,7 +147,7 @@ def test_ends_that_are_the_smallest_number(core: ModuleType, exponent: int) -> N
     aside = np.linspace(0, 1e-3, 32)[:, None] * [1, 0, 0]
     origins = (aside * 2.0**exponent * smallest).astype(np.float32)
     # Not parallel.
-    directions = ((aside + [0, 0, 1]) * 2.0**exponent).astype(np.float32)
+    directions = ((aside + np.float64([0, 0, 1])) * 2.0**exponent).astype(np.float32)
     for share, stops in ((0.75, True), (1.25, True), (1.45, True), (1.75, False)):
         sheet = np.float64([[-1, -1, share], [2, -1, share], [-1, 2, share]])
         vertices = (sheet * 2.0**exponent * smallest).astype(np.float32)
