@@ -172,8 +172,8 @@ Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
         rays.origin[k] = columns[k].data();
         rays.direction[k] = columns[k + 3].data();
     }
-    rays.t_min = t_min.data();
-    rays.t_max = t_max.data();
+    rays.t_min = IntervalEnds(t_min.data());
+    rays.t_max = IntervalEnds(t_max.data());
     return trace_with(tree.built.tree, kernel, rays, {t.data(), primitives.data()});
 }
 

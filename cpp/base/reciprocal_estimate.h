@@ -32,20 +32,10 @@ inline FloatPacket reciprocal_estimate(const FloatPacket &a) {
     return fused(rough, left, rough);
 }
 
-// About 1 / sqrt(a), of numbers from 2^-100 to 2^100, to within 2^-21 of it: for what no
-// result depends on but to that accuracy.
+// About 1 / sqrt(a), to a few units of the last place: for what no result depends on but to
+// that accuracy.
 inline FloatPacket reciprocal_root_estimate(const FloatPacket &a) {
-#if defined(__AVX512F__)
-    const FloatPacket rough(_mm512_rsqrt14_ps(a.m));
-#elif defined(__AVX__)
-    using Half = std::decay_t<decltype(drjit::low(a))>;
-    const FloatPacket rough(Half(_mm256_rsqrt_ps(drjit::low(a).m)),
-                            Half(_mm256_rsqrt_ps(drjit::high(a).m)));
-#else
-    const FloatPacket rough = 1.0f / square_root(a);
-#endif
-    const FloatPacket left = fused_difference(a * rough, rough, FloatPacket(1.0f));
-    return fused(0.5f * rough, left, rough);
+    return drjit::rsqrt(a);
 }
 
 } // namespace mlrt

@@ -62,8 +62,8 @@ Beam beam_of_rays(const Points &origins, const Points &directions, const Values 
         group.direction[k] = d[k].data();
         group.common_origin[k] = count > 0 ? o[k][0] : 0;
     }
-    group.t_min = t_min.data();
-    group.t_max = t_max.data();
+    group.t_min = IntervalEnds(t_min.data());
+    group.t_max = IntervalEnds(t_max.data());
     KeepDenormals keep;
     return ray_beam(group, 0, count);
 }

@@ -78,8 +78,8 @@ std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &directio
         group.origin[k] = &origin[size_t(k)];
         group.direction[k] = &direction[size_t(k)];
     }
-    group.t_min = &zero;
-    group.t_max = &one;
+    group.t_min = IntervalEnds(&zero);
+    group.t_max = IntervalEnds(&one);
     const auto [packet, extreme] = load_packet<LaneOrigins>(group, 0);
     if (packet.active != 1)
         throw nb::value_error("a moderate direction");
@@ -101,8 +101,8 @@ nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray 
     group.common_origin = {origin[0], origin[1], origin[2]};
     for (int k = 0; k < 3; ++k)
         group.direction[k] = &direction[size_t(k)];
-    group.t_min = &zero;
-    group.t_max = &one;
+    group.t_min = IntervalEnds(&zero);
+    group.t_max = IntervalEnds(&one);
     WidePacket packet{load_packet<CommonOrigin>(group, 0).rays, 0, 0, 1};
     if (packet.rays.active != 1)
         throw nb::value_error("a moderate direction");
@@ -142,8 +142,8 @@ nb::tuple entered_boxes(const Point &origin, const TriangleArray &directions,
             direction[k][i] = directions(i, 0, k);
         group.direction[k] = direction[k].data();
     }
-    group.t_min = zero.data();
-    group.t_max = one.data();
+    group.t_min = IntervalEnds(zero.data());
+    group.t_max = IntervalEnds(one.data());
     WideNode node{};
     for (size_t i = 0; i < BLOCK_WIDTH; ++i)
         for (size_t face = 0; face < 6; ++face)

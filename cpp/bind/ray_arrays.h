@@ -64,8 +64,8 @@ public:
             group.origin[k] = origins_[k].data() + first;
             group.direction[k] = directions_[k].data() + first;
         }
-        group.t_min = t_min_ + first;
-        group.t_max = t_max_ + first;
+        group.t_min = IntervalEnds(t_min_ + first);
+        group.t_max = IntervalEnds(t_max_ + first);
         // A common origin costs less, and cameras and point lights have one.
         group.common_origin = origin(first);
         group.has_common_origin = true;

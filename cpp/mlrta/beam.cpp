@@ -4,6 +4,7 @@
 #include "base/morton.h"
 #include "base/reciprocal_estimate.h"
 #include "base/simd.h"
+#include "mlrta/packet_range.h"
 #include "traverse/load_packet.h"
 
 #include <algorithm>
@@ -71,18 +72,6 @@ void corners_from_slopes(Beam &beam) {
     }
 }
 
-// Least and greatest of what is added, lane by lane: the second operand of minimum() and
-// maximum() stays where the first is not a number.
-struct PacketRange {
-    FloatPacket lo = INFINITY, hi = -INFINITY;
-
-    void add(const FloatPacket &x) {
-        lo = minimum(x, lo);
-        hi = maximum(x, hi);
-    }
-    Range of_all_lanes() const { return {least_lane(lo), greatest_lane(hi)}; }
-};
-
 // An estimate of a reciprocal, a rounding to single precision and those of what follows,
 // and quotients that underflow.
 constexpr double WIDEN_QUOTIENT = 0x1p-21, SMALLEST_QUOTIENT = 0x1p-120;
@@ -103,8 +92,7 @@ public:
             d[k] = load_padded(rays.direction[k], first, first + count);
             active &= absolute(d[k]) < FloatPacket(INFINITY);
         }
-        // Not a number: left out by minimum() and maximum().
-        const FloatPacket none(std::numeric_limits<float>::quiet_NaN());
+        const FloatPacket none(PacketRange::NONE);
         for (int k = 0; k < 3; ++k)
             d[k] = select(active, d[k], none);
         const Vec3<FloatPacket> r =

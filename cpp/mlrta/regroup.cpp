@@ -157,9 +157,9 @@ RayGroup RegroupedRays::group(const RayGroup &from) {
             group.origin[k] = origin[k].data();
     }
     if (from.t_min.each())
-        group.t_min = t_min.data();
+        group.t_min = IntervalEnds(t_min.data());
     if (from.t_max.each())
-        group.t_max = t_max.data();
+        group.t_max = IntervalEnds(t_max.data());
     if (from.cost) {
         std::fill_n(cost.begin(), count, 0.0f);
         group.cost = cost.data();

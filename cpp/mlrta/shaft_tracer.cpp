@@ -1,5 +1,6 @@
 #include "mlrta/shaft_tracer.h"
 
+#include "mlrta/packet_range.h"
 #include "traverse/load_packet.h"
 #include "traverse/packet_state.h"
 
@@ -11,26 +12,23 @@ namespace mlrt {
 
 namespace {
 
-// Bounds of points, lane by lane.
+// Bounds of points.
 class PointBounds {
 public:
     // In the given lanes.
     void add(LaneBits lanes, const Vec3<FloatPacket> &p) {
         const auto mask = from_bits<FloatPacket>(lanes);
-        for (int k = 0; k < 3; ++k) {
-            lo_[k] = minimum(select(mask, p[k], FloatPacket(INFINITE)), lo_[k]);
-            hi_[k] = maximum(select(mask, p[k], FloatPacket(-INFINITE)), hi_[k]);
-        }
+        for (int k = 0; k < 3; ++k)
+            ranges_[k].add(select(mask, p[k], FloatPacket(PacketRange::NONE)));
     }
 
     Box3f box() const {
-        return {by_axis([&](int k) { return least_lane(lo_[k]); }),
-                by_axis([&](int k) { return greatest_lane(hi_[k]); })};
+        return {by_axis([&](int k) { return least_lane(ranges_[k].lo); }),
+                by_axis([&](int k) { return greatest_lane(ranges_[k].hi); })};
     }
 
 private:
-    Vec3<FloatPacket> lo_{INFINITE, INFINITE, INFINITE};
-    Vec3<FloatPacket> hi_{-INFINITE, -INFINITE, -INFINITE};
+    Vec3<PacketRange> ranges_;
 };
 
 float reach_of(const Box3f &box) {
@@ -58,6 +56,10 @@ std::vector<uint32_t> ShaftTracer::trace(uint8_t *occluded) {
 
 void ShaftTracer::trace_run(uint32_t first, uint32_t count) {
     const std::optional<Shaft> shaft = shaft_of(first, count);
+    if (active_ == 0) {
+        std::fill_n(occluded_ + first, count, uint8_t(0));
+        return;
+    }
     if (shaft && find_candidates(*shaft)) {
         patience_.win();
         test_candidates(first, count);
@@ -96,10 +98,10 @@ std::optional<Shaft> ShaftTracer::shaft_of(uint32_t first, uint32_t count) {
         begin.add(lanes, o);
         end.add(lanes, o + latest_distance(t_max) * d);
     }
+    if (active_ == 0)
+        return std::nullopt;
     const Box3f from = begin.box();
     Box3f to = end.box();
-    if (active_ == 0)
-        return Shaft({{}, {}}, {{}, {}}, 0);
     const float reach =
         std::max(reach_of(tree_.bounds), std::max(reach_of(from), reach_of(to)));
     if (!(reach < LARGEST_COORDINATE))
@@ -119,8 +121,6 @@ bool ShaftTracer::find_candidates(const Shaft &shaft) {
         Box3f cell;
     };
     candidate_count_ = triangles_ = 0;
-    if (active_ == 0)
-        return true;
     mailbox_.clear();
     std::array<Part, MAX_TREE_DEPTH + 1> waiting;
     uint32_t pending = 0;

@@ -50,11 +50,11 @@ struct OrderedRays {
         }
         if (rays.t_min.each()) {
             t_min = in_order(numbers, rays.t_min.each());
-            group.t_min = t_min.data();
+            group.t_min = IntervalEnds(t_min.data());
         }
         if (rays.t_max.each()) {
             t_max = in_order(numbers, rays.t_max.each());
-            group.t_max = t_max.data();
+            group.t_max = IntervalEnds(t_max.data());
         }
     }
     OrderedRays(const OrderedRays &) = delete;

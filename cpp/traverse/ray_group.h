@@ -13,7 +13,7 @@ namespace mlrt {
 class IntervalEnds {
 public:
     IntervalEnds() = default;
-    IntervalEnds(const float *each) : each_(each) {}
+    explicit IntervalEnds(const float *each) : each_(each) {}
     static IntervalEnds of_all(float common) {
         IntervalEnds ends;
         ends.common_ = common;
