@@ -231,6 +231,7 @@ void BeamPackets::fit_rectangle() {
     rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
     greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
                    2 * (rectangle.half_p + rectangle.half_q);
+    least_half_p = least_half_q = 0;
     // Without rays the center is NaN, the sides are negative, and `least` is infinite.
     for (uint32_t r = 0; r < run_count(); ++r) {
         Run &run = runs[r];

@@ -100,6 +100,8 @@ struct BeamPackets {
         RayBounds all;
     };
     std::array<Run, RUNS> runs;
+    // No packet's bounds are narrower.
+    float least_half_p, least_half_q;
 
     // Packets that one triangle covers, nearer than all else that was found, and the linear
     // form of its reciprocal depths. Their rays are told so by settle().

@@ -34,6 +34,41 @@ bool in_one_plane(const Triangle &one, const Triangle &other) {
     return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
 }
 
+// Pairs of a triangle of a block and a run, or a packet, of a beam, are numbered: CAPACITY
+// times the triangle's lane plus the first packet.
+constexpr uint32_t lane_of_pair(uint32_t pair) {
+    return pair / BeamPackets::CAPACITY;
+}
+constexpr uint32_t run_of(uint32_t pair) {
+    return pair % BeamPackets::CAPACITY / PACKET_WIDTH;
+}
+
+class RunPairs {
+public:
+    // Adds those of a run with the triangles in the given lanes.
+    void add(uint32_t run, LaneBits triangles) {
+        store_compressed(pairs_.data() + count_,
+                         lane_indices() * BeamPackets::CAPACITY +
+                             UIntPacket(run * PACKET_WIDTH),
+                         triangles);
+        count_ += uint32_t(std::popcount(triangles));
+    }
+
+    std::span<const uint32_t> all() const { return {pairs_.data(), count_}; }
+
+private:
+    // What is written comes in whole packets.
+    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + PACKET_WIDTH> pairs_;
+    uint32_t count_ = 0;
+};
+
+FloatPacket value_of(const TriangleForms &forms, int form, uint32_t lane,
+                     const BeamPacket &packet) {
+    return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
+                 fused(packet.v, FloatPacket(forms.of_v[form][lane]),
+                       FloatPacket(forms.constant[form][lane])));
+}
+
 } // namespace
 
 template <Query query>
@@ -97,50 +132,49 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
-    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + PACKET_WIDTH> of_runs;
-    uint32_t run_pairs = 0;
+    const LaneBits large =
+        query == Query::closest ? possible & forms.possible_covers(beam_) : 0;
+    RunPairs of_large, of_small;
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const LaneBits triangles =
             one_run ? possible : possible & forms.possible_for(beam_.runs[n]);
-        store_compressed(of_runs.data() + run_pairs,
-                         lane_indices() * BeamPackets::CAPACITY +
-                             UIntPacket(n * PACKET_WIDTH),
-                         triangles);
-        run_pairs += uint32_t(std::popcount(triangles));
+        of_large.add(n, triangles & large);
+        of_small.add(n, triangles & ~large);
     }
-    bool any_covered = false;
     uint32_t pairs = 0;
     uint64_t in_pairs = 0; // packets
-    for (uint32_t i = 0; i < run_pairs; ++i) {
-        const uint32_t first = of_runs[i];
-        const uint32_t n = first % BeamPackets::CAPACITY / PACKET_WIDTH,
-                       lane = first / BeamPackets::CAPACITY;
-        const BeamPackets::Run &run = beam_.runs[n];
-        LaneBits packets;
-        if constexpr (query == Query::any) {
-            packets = forms.packets_for(lane, run);
-        } else {
-            const auto coverage = forms.coverage_of(lane, beam_, run);
-            packets = coverage.possible & ~coverage.covered;
-            in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
-            if (coverage.covered != 0) {
-                cover(n, coverage, forms, lane, numbers[lane]);
-                any_covered = true;
-            }
-        }
+    const auto add_pairs = [&](uint32_t first, LaneBits packets) {
         store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
                          packets);
         pairs += uint32_t(std::popcount(packets));
+    };
+    bool any_covered = false;
+    for (const uint32_t first : of_large.all()) {
+        const uint32_t n = run_of(first), lane = lane_of_pair(first);
+        const auto coverage = forms.coverage_of(lane, beam_, beam_.runs[n]);
+        const LaneBits packets = coverage.possible & ~coverage.covered;
+        in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
+        if (coverage.covered != 0) {
+            cover(n, coverage, forms, lane, numbers[lane]);
+            any_covered = true;
+        }
+        add_pairs(first, packets);
+    }
+    for (const uint32_t first : of_small.all()) {
+        const uint32_t n = run_of(first);
+        const LaneBits packets = forms.packets_for(lane_of_pair(first), beam_.runs[n]);
+        in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
+        add_pairs(first, packets);
     }
     counters_.triangle_tests += pairs;
     if constexpr (query == Query::closest)
         beam_.settle(rays_, in_pairs);
+    pairs = packets_inside(forms, pairs);
     uint64_t changed = 0;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
-        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
-                       lane = pairs_[i] / BeamPackets::CAPACITY;
-        const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
+        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY, lane = lane_of_pair(pairs_[i]);
+        const LaneBits found = test_packet(n, forms, lane, numbers[lane], sides_[i]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
     }
@@ -183,33 +217,49 @@ void BeamTriangleTests<query>::cover(uint32_t number,
     for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
+// Keeps those of the pairs in which rays may pass within the triangle's edges: most of small
+// triangles lie between rays. Without a branch, as nobody foresees which. Returns how many
+// are kept.
+template <Query query>
+uint32_t BeamTriangleTests<query>::packets_inside(const TriangleForms &forms,
+                                                  uint32_t pairs) {
+    uint32_t kept = 0;
+    for (uint32_t i = 0; i < pairs; ++i) {
+        const uint32_t pair = pairs_[i], lane = lane_of_pair(pair);
+        const BeamPacket &packet = beam_.packets[pair % BeamPackets::CAPACITY];
+        const auto value = [&](int form) { return value_of(forms, form, lane, packet); };
+        const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
+        const FloatPacket error(EXACT ? forms.edge_error[lane] : 0.0f);
+        const LaneBits possible = to_bits(smallest + error >= 0.0f);
+        const LaneBits certain = EXACT ? to_bits(smallest > error) : possible;
+        pairs_[kept] = pair;
+        sides_[kept] = {uint16_t(possible), uint16_t(certain)};
+        kept += possible != 0;
+    }
+    return kept;
+}
+
 // One triangle against sixteen rays. Returns whether they found something.
 template <Query query>
 bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
-                                           uint32_t lane, uint32_t primitive) {
+                                           uint32_t lane, uint32_t primitive,
+                                           EdgeSides sides) {
     BeamPacket &packet = beam_.packets[number];
-    const auto value = [&](int form) {
-        return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
-                     fused(packet.v, FloatPacket(forms.of_v[form][lane]),
-                           FloatPacket(forms.constant[form][lane])));
-    };
-    const FloatPacket depth = value(TriangleForms::DEPTH);
+    const FloatPacket depth = value_of(forms, TriangleForms::DEPTH, lane, packet);
     const FloatPacket error(forms.depth_error[lane]);
-    const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
     const FloatPacket highest =
         EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
     const FloatPacket lowest =
         EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
-    const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-    auto possible = (highest >= packet.least) & (smallest >= -edge_error);
+    LaneBits possible = sides.possible & to_bits(highest >= packet.least);
     FloatPacket begin(beam_.nearest);
     if (query == Query::any && beam_.parallel) {
         begin = beam_.begins[number].least;
-        possible &= lowest <= beam_.begins[number].greatest;
+        possible &= to_bits(lowest <= beam_.begins[number].greatest);
     }
-    const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
-    const auto nearer = possible & certain & (lowest > packet.greatest) & (highest < begin);
-    const LaneBits found = to_bits(nearer);
+    const LaneBits found = possible & sides.certain &
+                           to_bits((lowest > packet.greatest) & (highest < begin));
+    const auto nearer = from_bits<FloatPacket>(found);
     packet.found |= found;
     if constexpr (query == Query::any) {
         packet.least = select(nearer, FloatPacket(INFINITE), packet.least);
@@ -219,9 +269,9 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
         packet.primitive =
             select(MaskOf<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
     }
-    const LaneBits open = EXACT ? to_bits(possible) & ~found : 0;
+    const LaneBits open = EXACT ? possible & ~found : 0;
     if (open != 0) [[unlikely]]
-        decide(packet, open, to_bits(certain), primitive);
+        decide(packet, open, sides.certain, primitive);
     return (found | open) != 0;
 }
 

@@ -48,11 +48,17 @@ public:
     std::span<const uint32_t> hit() const { return {hit_.data(), hit_count_}; }
 
 private:
+    // Rays of a packet that may pass within the edges of a triangle, and that certainly do.
+    struct EdgeSides {
+        uint16_t possible, certain;
+    };
+
     void test_block(const uint32_t *numbers, uint32_t count);
     void cover(uint32_t run, const TriangleForms::Coverage &coverage,
                const TriangleForms &forms, uint32_t lane, uint32_t primitive);
+    uint32_t packets_inside(const TriangleForms &forms, uint32_t pairs);
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
-                     uint32_t primitive);
+                     uint32_t primitive, EdgeSides sides);
     void test_unsafe(uint32_t primitive);
     void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                 uint32_t primitive);
@@ -75,6 +81,7 @@ private:
     // number of the triangle plus that of the packet. What is written there comes in whole
     // packets.
     std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
+    std::array<EdgeSides, WIDE_WIDTH * BeamPackets::CAPACITY> sides_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
     std::array<uint32_t, WIDE_WIDTH> hit_;

@@ -113,12 +113,14 @@ void BeamPackets::fit_to_film(const CameraTile &tile, uint32_t first,
     greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
                    1.5f * (rectangle.half_p + half_of(p, widest) + rectangle.half_q +
                            half_of(q, widest));
+    least_half_p = half_of(p, packet);
+    least_half_q = half_of(q, packet);
     for (uint32_t r = 0; r < run_count(); ++r) {
         Run &run = runs[r];
         const uint32_t first_of_run = first + r * RUN_RAYS;
         set_middles(tile, first_of_run, packet, first_lanes(count - r * PACKET_WIDTH), run);
-        run.half_p = FloatPacket(half_of(p, packet));
-        run.half_q = FloatPacket(half_of(q, packet));
+        run.half_p = FloatPacket(least_half_p);
+        run.half_q = FloatPacket(least_half_q);
         run.all = {0, 0, rectangle.half_p, rectangle.half_q, run.all.least};
         if (count <= PACKET_WIDTH)
             continue;

@@ -75,7 +75,10 @@ Real TriangleForms::put_form(int form, const LaidRectangle<Real> &r, const Real 
     store(center[form], middle);
     store(of_p[form], form_p);
     store(of_q[form], form_q);
-    return middle + fused(absolute(form_p), r.half_p, absolute(form_q) * r.half_q);
+    const Real along_p = absolute(form_p), along_q = absolute(form_q);
+    store(size_p[form], along_p);
+    store(size_q[form], along_q);
+    return middle + fused(along_p, r.half_p, along_q * r.half_q);
 }
 
 } // namespace mlrt

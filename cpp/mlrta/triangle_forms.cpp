@@ -26,7 +26,7 @@ constexpr float UNDERFLOW = 0x1p-146f;
 // difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
 // have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
 // a rectangle two roundings lead to the form's value at the center, three to its change
-// along a side, and five to the sum of all: 16 in a row. That is 32 s e S; 40 covers
+// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S; 40 covers
 // products of roundings and the bound itself.
 constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
 // Depth: N comes from double precision, where thin triangles keep its digits. With n its
@@ -139,12 +139,23 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
 }
 
 template <typename Real, typename Bounds, typename ValueOf>
-TriangleForms::FormRange<Real> TriangleForms::range_of(int form, const Bounds &bounds,
-                                                       ValueOf &&value_of) const {
-    const Real p = value_of(of_p[form]), q = value_of(of_q[form]);
-    return {fused(p, Real(bounds.center_p),
-                  fused(q, Real(bounds.center_q), value_of(center[form]))),
-            fused(absolute(p), Real(bounds.half_p), absolute(q) * Real(bounds.half_q))};
+Real TriangleForms::middle(int form, const Bounds &bounds, ValueOf &&value_of) const {
+    return fused(value_of(of_p[form]), Real(bounds.center_p),
+                 fused(value_of(of_q[form]), Real(bounds.center_q), value_of(center[form])));
+}
+
+template <typename Real, typename Bounds, typename ValueOf>
+Real TriangleForms::greatest(int form, const Bounds &bounds, ValueOf &&value_of) const {
+    return fused(value_of(size_p[form]), Real(bounds.half_p),
+                 fused(value_of(size_q[form]), Real(bounds.half_q),
+                       middle<Real>(form, bounds, value_of)));
+}
+
+template <typename Real, typename Bounds, typename ValueOf>
+Real TriangleForms::least(int form, const Bounds &bounds, ValueOf &&value_of) const {
+    return fused_difference(value_of(size_p[form]), Real(bounds.half_p),
+                            fused_difference(value_of(size_q[form]), Real(bounds.half_q),
+                                             middle<Real>(form, bounds, value_of)));
 }
 
 // Whether rays within a rectangle may hit a triangle, nearer than `least`: one triangle and
@@ -157,15 +168,15 @@ MaskOf<Real> TriangleForms::may_hit(const Bounds &bounds, const Real &least,
     const auto touched =
         (absolute(center_p - value_of(box_p)) <= half_p + value_of(box_half_p)) &
         (absolute(center_q - value_of(box_q)) <= half_q + value_of(box_half_q));
-    const auto greatest = [&](int form) {
-        return range_of<Real>(form, bounds, value_of).greatest();
+    const auto greatest_of = [&](int form) {
+        return greatest<Real>(form, bounds, value_of);
     };
-    const Real edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
-    const Real depth = greatest(DEPTH);
+    const Real edges = minimum(greatest_of(0), minimum(greatest_of(1), greatest_of(2)));
+    const Real depth = greatest_of(DEPTH);
     if constexpr (!EXACT)
         return touched & (edges >= 0.0f) & (depth >= least);
     const Real highest = fused(depth, value_of(depth_grow), value_of(depth_error));
-    return touched & (edges >= -value_of(edge_error)) & (highest >= least);
+    return touched & (edges + value_of(edge_error) >= 0.0f) & (highest >= least);
 }
 
 LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) const {
@@ -182,14 +193,13 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
     // Without branches: nobody foresees where triangles lie.
     Coverage packets;
     packets.possible = to_bits(may_hit(run, load<FloatPacket>(run.least), value_of));
-    const auto least = [&](int form) {
-        return range_of<FloatPacket>(form, run, value_of).least();
+    const auto least_of = [&](int form) {
+        return least<FloatPacket>(form, run, value_of);
     };
-    const FloatPacket edges = minimum(least(0), minimum(least(1), least(2)));
+    const FloatPacket edges = minimum(least_of(0), minimum(least_of(1), least_of(2)));
     const auto inside = edges > (EXACT ? value_of(edge_error) : FloatPacket(0.0f));
-    const FormRange<FloatPacket> depth = range_of<FloatPacket>(DEPTH, run, value_of);
-    packets.least = depth.least();
-    packets.greatest = depth.greatest();
+    packets.least = least_of(DEPTH);
+    packets.greatest = greatest<FloatPacket>(DEPTH, run, value_of);
     if constexpr (EXACT) {
         const FloatPacket error = value_of(depth_error);
         packets.least = fused(packets.least, value_of(depth_shrink), -error);
@@ -199,6 +209,11 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
                         (packets.greatest < FloatPacket(beam.nearest));
     packets.covered = packets.possible & to_bits(inside & nearer);
     return packets;
+}
+
+LaneBits TriangleForms::possible_covers(const BeamPackets &beam) const {
+    return possible & to_bits((load<FloatWide>(box_half_p) >= beam.least_half_p) &
+                              (load<FloatWide>(box_half_q) >= beam.least_half_q));
 }
 
 template <typename Real>

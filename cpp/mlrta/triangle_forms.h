@@ -35,8 +35,10 @@ struct alignas(64) TriangleForms {
     // value = constant + u * of_u + v * of_v
     Lanes constant[4], of_u[4], of_v[4];
 
-    // The same over the beam's rectangle: value = center + p * of_p + q * of_q.
+    // The same over the beam's rectangle: value = center + p * of_p + q * of_q; and how much
+    // a form changes by unit of half a rectangle's sides.
     Lanes center[4], of_p[4], of_q[4];
+    Lanes size_p[4], size_q[4];
 
     // A rectangle around what the beam sees of the triangle, as those of packets are:
     // infinite if a vertex does not lie ahead.
@@ -67,6 +69,8 @@ struct alignas(64) TriangleForms {
     };
     Coverage coverage_of(uint32_t lane, const BeamPackets &beam,
                          const BeamPackets::Run &run) const;
+    // Of the possible triangles those that are large enough to cover a packet.
+    LaneBits possible_covers(const BeamPackets &beam) const;
     // Of the possible triangles those that any packet of the run may be hit by so.
     LaneBits possible_for(const BeamPackets::Run &run) const;
 
@@ -80,16 +84,13 @@ private:
     template <typename Real>
     Real put_form(int form, const LaidRectangle<Real> &rectangle, const Real &form_1,
                   const Real &form_u, const Real &form_v);
-    // Least and greatest value over a rectangle: middle -+ extent.
-    template <typename Real>
-    struct FormRange {
-        Real middle, extent;
-
-        Real least() const { return middle - extent; }
-        Real greatest() const { return middle + extent; }
-    };
+    // Value in the middle of a rectangle, and the greatest and least over it.
     template <typename Real, typename Bounds, typename ValueOf>
-    FormRange<Real> range_of(int form, const Bounds &bounds, ValueOf &&value_of) const;
+    Real middle(int form, const Bounds &bounds, ValueOf &&value_of) const;
+    template <typename Real, typename Bounds, typename ValueOf>
+    Real greatest(int form, const Bounds &bounds, ValueOf &&value_of) const;
+    template <typename Real, typename Bounds, typename ValueOf>
+    Real least(int form, const Bounds &bounds, ValueOf &&value_of) const;
     template <typename Real, typename Bounds, typename ValueOf>
     MaskOf<Real> may_hit(const Bounds &bounds, const Real &least, ValueOf &&value_of) const;
     template <typename Real>
