@@ -18,6 +18,9 @@ namespace {
 // chosen from 40 to 300.
 constexpr uint32_t DENSE_TRIANGLES = 200;
 
+// So many blocks are tested leaf by leaf, full or not; chosen from 1 to 4.
+constexpr uint32_t BLOCKS_AT_ONCE = 4;
+
 Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
 }
@@ -80,15 +83,18 @@ void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) 
     flush();
 }
 
-// Where a beam meets many triangles, each leaf's are only fetched, to be tested when those
-// of the next have been as well: the memory has time to bring them, and blocks are full.
+// The first leaves' triangles are tested at once, as they may stop all rays. A beam that goes
+// on visits many leaves, and their triangles wait till a block is full. Where it meets many,
+// they wait until those of the next leaves have been fetched as well: the memory has time
+// to bring them.
 template <Query query>
 void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
+    const bool fills = blocks_ >= BLOCKS_AT_ONCE;
     for (const uint32_t primitive : tree_.references_of(leaf)) {
         // Without a branch, as nobody foresees which are known.
         waiting_[waiting_count_] = primitive;
         waiting_count_ += !mailbox_.put(primitive);
-        if (dense_)
+        if (fills)
             prefetch(&tree_.triangles[primitive]);
         if (waiting_count_ < (dense_ ? waiting_.size() : WIDE_WIDTH))
             continue;
@@ -96,7 +102,7 @@ void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
         waiting_count_ -= WIDE_WIDTH;
         std::copy_n(waiting_.begin() + WIDE_WIDTH, waiting_count_, waiting_.begin());
     }
-    if (!dense_)
+    if (!fills)
         flush();
 }
 
@@ -117,6 +123,7 @@ template <Query query>
 void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t count) {
     TriangleForms forms;
     forms.set(beam_, least_, tree_.triangles.data(), numbers, count);
+    ++blocks_;
     ++counters_.beam_blocks;
     const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
     counters_.beam_triangles += tested;
@@ -132,13 +139,15 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
-    const LaneBits large =
-        query == Query::closest ? possible & forms.possible_covers(beam_) : 0;
+    LaneBits large = 0;
+    if constexpr (query == Query::closest)
+        large = forms.possible_covers(beam_);
     RunPairs of_large, of_small;
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const LaneBits triangles =
             one_run ? possible : possible & forms.possible_for(beam_.runs[n]);
-        of_large.add(n, triangles & large);
+        if constexpr (query == Query::closest)
+            of_large.add(n, triangles & large);
         of_small.add(n, triangles & ~large);
     }
     uint32_t pairs = 0;

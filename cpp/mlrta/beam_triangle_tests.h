@@ -74,6 +74,7 @@ private:
     BeamPackets &beam_;
     Counters &counters_;
     uint32_t triangles_left_;
+    uint32_t blocks_ = 0; // tested
     uint32_t tested_ = 0;
     bool dense_ = false; // whether there are many triangles
     RayGrid grid_;       // where there are
