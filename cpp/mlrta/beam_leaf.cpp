@@ -208,10 +208,10 @@ bool BeamWalk<query>::walk(const Entry &entry) {
 
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
+                     BeamMemory &memory, const BeamBudget &budget, BeamPackets &beam,
                      Counters &counters) {
-    BeamTriangleTests<query> tests(tree, rays, memory.distances, memory.mailbox,
-                                   most_triangles, beam, counters);
+    BeamTriangleTests<query> tests(tree, rays, memory.distances, memory.mailbox, budget,
+                                   beam, counters);
     bool done = true;
     if (memory.occluder_count > 0)
         tests.test_first({memory.occluders.data(), memory.occluder_count});
@@ -235,10 +235,11 @@ bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &f
 }
 
 template bool trace_beam_leaf<Query::closest>(const KdTree &, const RayGroup &,
-                                              const Frontier &, BeamMemory &, uint32_t,
-                                              BeamPackets &, Counters &);
+                                              const Frontier &, BeamMemory &,
+                                              const BeamBudget &, BeamPackets &,
+                                              Counters &);
 template bool trace_beam_leaf<Query::any>(const KdTree &, const RayGroup &,
-                                          const Frontier &, BeamMemory &, uint32_t,
-                                          BeamPackets &, Counters &);
+                                          const Frontier &, BeamMemory &,
+                                          const BeamBudget &, BeamPackets &, Counters &);
 
 } // namespace mlrt

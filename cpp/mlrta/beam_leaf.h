@@ -7,6 +7,7 @@
 #pragma once
 
 #include "base/counters.h"
+#include "mlrta/beam_budget.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/frontier.h"
 #include "mlrta/hit_distances.h"
@@ -35,11 +36,11 @@ struct BeamMemory {
 // Finds for the active rays of a beam what they hit in the subtrees of a frontier: the
 // nearest triangles, or any. The group is the one that the beam was loaded from.
 //
-// Gives up once more than `most_triangles` were tested against the beam, and returns false:
-// what has been found till then is true of Query::any, and of no use otherwise.
+// Gives up once the budget is spent, and returns false: what has been found till then is
+// true of Query::any, and of no use otherwise.
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,
-                     BeamMemory &memory, uint32_t most_triangles, BeamPackets &beam,
+                     BeamMemory &memory, const BeamBudget &budget, BeamPackets &beam,
                      Counters &counters);
 
 } // namespace mlrt

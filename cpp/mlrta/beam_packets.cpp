@@ -248,6 +248,15 @@ void BeamPackets::fit_rectangle() {
     }
 }
 
+uint32_t BeamPackets::found_count() const {
+    uint32_t found = 0;
+    for (uint32_t n = 0; n < count; ++n) {
+        const BeamPacket &packet = packets[n];
+        found += uint32_t(std::popcount(is_covered(n) ? packet.active : packet.found));
+    }
+    return found;
+}
+
 void BeamPackets::settle_packet(const RayGroup &rays, uint32_t number) {
     if (unloaded >> number & 1)
         load_camera_packet(rays, number);

@@ -115,6 +115,9 @@ struct BeamPackets {
 
     bool is_covered(uint32_t number) const { return covered >> number & 1; }
 
+    // How many rays have found something.
+    uint32_t found_count() const;
+
     // Packets of a camera's rays that have not been looked at: of those only `first_ray`,
     // `active`, `found` and `strays` are known.
     uint64_t unloaded;

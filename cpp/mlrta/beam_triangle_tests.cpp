@@ -127,9 +127,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     ++counters_.beam_blocks;
     const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
     counters_.beam_triangles += tested;
-    triangles_left_ -= std::min(triangles_left_, tested);
-    tested_ += tested;
-    if (tested_ > DENSE_TRIANGLES && !dense_) {
+    budget_.spend(tested, [&] { return beam_.found_count(); });
+    if (budget_.tested() > DENSE_TRIANGLES && !dense_) {
         beam_.load_slopes(rays_);
         grid_.fill(beam_);
         dense_ = true;

@@ -4,6 +4,7 @@
 
 #include "base/counters.h"
 #include "kdtree/tree.h"
+#include "mlrta/beam_budget.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/hit_distances.h"
 #include "mlrta/mailbox.h"
@@ -23,10 +24,10 @@ template <Query query>
 class BeamTriangleTests {
 public:
     BeamTriangleTests(const KdTree &tree, const RayGroup &rays, HitDistances &distances,
-                      Mailbox &mailbox, uint32_t most_triangles, BeamPackets &beam,
+                      Mailbox &mailbox, const BeamBudget &budget, BeamPackets &beam,
                       Counters &counters)
         : tree_(tree), rays_(rays), distances_(distances), mailbox_(mailbox), beam_(beam),
-          counters_(counters), triangles_left_(most_triangles) {
+          counters_(counters), budget_(budget) {
         mailbox_.clear();
         update_least();
     }
@@ -42,8 +43,8 @@ public:
     float far_end() const { return far_end_; }
     // Whether no ray has anything to find at all.
     bool all_done() const { return least_ == INFINITY; }
-    // Whether the beam has been tested against all the triangles that it may be.
-    bool spent() const { return triangles_left_ == 0; }
+    // Whether the beam had better be given up.
+    bool spent() const { return budget_.spent(); }
     // Triangles that rays were found to hit, at most WIDE_WIDTH of them.
     std::span<const uint32_t> hit() const { return {hit_.data(), hit_count_}; }
 
@@ -73,9 +74,8 @@ private:
     Mailbox &mailbox_;
     BeamPackets &beam_;
     Counters &counters_;
-    uint32_t triangles_left_;
+    BeamBudget budget_;
     uint32_t blocks_ = 0; // tested
-    uint32_t tested_ = 0;
     bool dense_ = false; // whether there are many triangles
     RayGrid grid_;       // where there are
     // Packets of the beam that triangles of a block may touch: its CAPACITY times the

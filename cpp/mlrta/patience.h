@@ -6,8 +6,8 @@
 
 namespace mlrt {
 // A beam takes long until it is known that it meets a dense surface. Surfaces go on: after
-// such a beam the next one is not tried, after another one the next three, and so on, until
-// one pays.
+// two such beams in a row the next one is not tried, after another one the next three, and
+// so on, until one pays.
 class Patience {
 public:
     // Whether the next beam should not be tried.
@@ -19,15 +19,18 @@ public:
     }
 
     // What came of one that was tried.
-    void lose() { left_ = spared_ = std::min(2 * spared_ + 1, MOST_SPARED); }
+    void lose() {
+        left_ = spared_;
+        spared_ = std::min(2 * spared_ + 1, MOST_SPARED);
+    }
     void win() { spared_ = 0; }
 
 private:
     // Chosen; half of it takes up to 4 % longer in dragon.
     static constexpr uint32_t MOST_SPARED = 32;
 
-    uint32_t spared_ = 0; // beams after the last one that was lost
-    uint32_t left_ = 0;   // of these
+    uint32_t spared_ = 0; // beams after the next one that is lost
+    uint32_t left_ = 0;   // of those after the last one
 };
 
 // That of this thread, for one kind of beams in one scene: neighbouring tiles are mostly
