@@ -58,12 +58,15 @@ public:
     uint32_t first_reference() const { return payload_.first_reference; }
     uint32_t reference_count() const { return info_ >> 8; }
 
+    // Of any node.
+    bool is_empty_leaf() const { return (info_ & ~FLAGS) == LEAF; }
+
     bool is_unbuilt() const { return (info_ & (UNBUILT | 3u)) == (UNBUILT | LEAF); }
     // Of what is to be built in place of an unbuilt leaf.
     uint32_t number() const { return payload_.first_reference; }
 
 private:
-    static constexpr uint32_t UNBUILT = 1u << 2;
+    static constexpr uint32_t UNBUILT = 1u << 2, FLAGS = 63u << 2;
 
     union {
         float split;

@@ -163,8 +163,10 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             // that both sides are visited then.
             const float first = size * unit.first - TINY_PARAMETER;
             const float last = size * unit.last + TINY_PARAMETER;
-            const bool enter_near = !(last < depths.near);
-            const bool enter_far = !(first > minimum(tests_.far_end(), depths.far));
+            const bool enter_near =
+                !(last < depths.near) & !(above ? upper : lower).is_empty_leaf();
+            const bool enter_far = !(first > minimum(tests_.far_end(), depths.far)) &
+                                   !(above ? lower : upper).is_empty_leaf();
             if (enter_near | enter_far) {
                 // Without branches, as nobody foresees where a beam goes. What waits is
                 // written even if it does not wait, and where only the far side is entered
