@@ -157,12 +157,16 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             const uint32_t axis = uint32_t(node.axis());
             const float distance = node.split() - beam_.origin[int(axis)];
             const bool above = distance < 0;
-            const CrossingDepths unit = crossing_[axis][above];
-            const float size = std::abs(distance);
+            // Of both sides of the plane, so that no load waits for where the origin lies.
+            const auto &[upwards, downwards] = crossing_[axis];
             // Not a number if the origin lies in the plane: comparisons are written so
             // that both sides are visited then.
-            const float first = size * unit.first - TINY_PARAMETER;
-            const float last = size * unit.last + TINY_PARAMETER;
+            const float first = (above ? -distance * downwards.first
+                                       : distance * upwards.first) -
+                                TINY_PARAMETER;
+            const float last =
+                (above ? -distance * downwards.last : distance * upwards.last) +
+                TINY_PARAMETER;
             const bool enter_near =
                 !(last < depths.near) & !(above ? upper : lower).is_empty_leaf();
             const bool enter_far = !(first > minimum(tests_.far_end(), depths.far)) &
