@@ -4,6 +4,7 @@
 #include "bind/bind.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
+#include "mlrta/beam_budget.h"
 #include "mlrta/ray_grid.h"
 #include "mlrta/regroup.h"
 #include "mlrta/trace.h"
@@ -194,11 +195,12 @@ TriangleForms triangle_forms_of(const BeamPackets &beam, const Rows &vertices) {
     return forms;
 }
 
-// The numbers of triangle and packet where one covers the other, and bounds of reciprocal
-// depths there.
+// The numbers of triangle and packet where one covers the other, bounds of reciprocal
+// depths there, and whether the triangle counts as large enough for that.
 nb::list covered_packets(const BeamUnderTest &self, const Rows &vertices) {
     const BeamPackets &beam = self.beam;
     const TriangleForms forms = triangle_forms_of(beam, vertices);
+    const LaneBits large = forms.possible_covers(beam);
     nb::list list;
     for_each_lane(forms.possible, [&](uint32_t triangle) {
         for (uint32_t n = 0; n < beam.run_count(); ++n) {
@@ -206,7 +208,8 @@ nb::list covered_packets(const BeamUnderTest &self, const Rows &vertices) {
             for_each_lane(coverage.covered, [&](uint32_t lane) {
                 list.append(nb::make_tuple(triangle, n * PACKET_WIDTH + lane,
                                            to_lanes<float>(coverage.least)[lane],
-                                           to_lanes<float>(coverage.greatest)[lane]));
+                                           to_lanes<float>(coverage.greatest)[lane],
+                                           (large >> triangle & 1) != 0));
             });
         }
     });
@@ -218,6 +221,7 @@ nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
     nb::dict dict;
     dict["possible"] = forms.possible;
     dict["unsafe"] = forms.unsafe;
+    dict["possible_covers"] = forms.possible_covers(self.beam);
     nb::list within;
     for (uint32_t n = 0; n < self.beam.run_count(); ++n)
         within.append(forms.possible_for(self.beam.runs[n]));
@@ -244,6 +248,20 @@ bool grid_may_hit(const BeamUnderTest &self, float p, float q, float half_p, flo
     forms.box_half_p[0] = half_p;
     forms.box_half_q[0] = half_q;
     return grid.may_hit(forms, 1) != 0;
+}
+
+// Whether the budget is spent after each of some steps: triangles, and how many rays have
+// found something by then.
+std::vector<bool> spent_after(uint32_t most_triangles, uint32_t first_look,
+                              float least_yield,
+                              const std::vector<std::tuple<uint32_t, uint32_t>> &steps) {
+    BeamBudget budget(most_triangles, first_look, least_yield);
+    std::vector<bool> spent;
+    for (const auto &[triangles, found] : steps) {
+        budget.spend(triangles, [found = found] { return found; });
+        spent.push_back(budget.spent());
+    }
+    return spent;
 }
 
 std::vector<uint32_t> list_of(const RayNumbers &numbers) {
@@ -298,6 +316,8 @@ void bind_beam_leaf_selftest(nb::module_ &m) {
         .def("forms", &forms_of, nb::arg("vertices"))
         .def("grid_may_hit", &grid_may_hit)
         .def("order", &order_of, nb::arg("share"));
+    s.def("spent_after", &spent_after, nb::arg("most_triangles"), nb::arg("first_look"),
+          nb::arg("least_yield"), nb::arg("steps"));
     s.def(
         "trace_tile", &trace_tile, nb::arg("tree"), nb::arg("origin"),
         nb::arg("directions"), nb::arg("map"), nb::arg("tile"), nb::arg("t_min"),

@@ -161,9 +161,9 @@ bool BeamWalk<query>::walk(const Entry &entry) {
             const auto &[upwards, downwards] = crossing_[axis];
             // Not a number if the origin lies in the plane: comparisons are written so
             // that both sides are visited then.
-            const float first = (above ? -distance * downwards.first
-                                       : distance * upwards.first) -
-                                TINY_PARAMETER;
+            const float first =
+                (above ? -distance * downwards.first : distance * upwards.first) -
+                TINY_PARAMETER;
             const float last =
                 (above ? -distance * downwards.last : distance * upwards.last) +
                 TINY_PARAMETER;

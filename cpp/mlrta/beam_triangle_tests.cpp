@@ -83,10 +83,10 @@ void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) 
     flush();
 }
 
-// The first leaves' triangles are tested at once, as they may stop all rays. A beam that goes
-// on visits many leaves, and their triangles wait till a block is full. Where it meets many,
-// they wait until those of the next leaves have been fetched as well: the memory has time
-// to bring them.
+// The first leaves' triangles are tested at once, as they may stop all rays. A beam that
+// goes on visits many leaves, and their triangles wait till a block is full. Where it meets
+// many, they wait until those of the next leaves have been fetched as well: the memory has
+// time to bring them.
 template <Query query>
 void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
     const bool fills = blocks_ >= BLOCKS_AT_ONCE;
@@ -181,7 +181,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     uint64_t changed = 0;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
-        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY, lane = lane_of_pair(pairs_[i]);
+        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
+                       lane = lane_of_pair(pairs_[i]);
         const LaneBits found = test_packet(n, forms, lane, numbers[lane], sides_[i]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
@@ -225,9 +226,9 @@ void BeamTriangleTests<query>::cover(uint32_t number,
     for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
-// Keeps those of the pairs in which rays may pass within the triangle's edges: most of small
-// triangles lie between rays. Without a branch, as nobody foresees which. Returns how many
-// are kept.
+// Keeps those of the pairs in which rays may pass within the triangle's edges: most of
+// small triangles lie between rays. Without a branch, as nobody foresees which. Returns how
+// many are kept.
 template <Query query>
 uint32_t BeamTriangleTests<query>::packets_inside(const TriangleForms &forms,
                                                   uint32_t pairs) {
@@ -265,8 +266,8 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
         begin = beam_.begins[number].least;
         possible &= to_bits(lowest <= beam_.begins[number].greatest);
     }
-    const LaneBits found = possible & sides.certain &
-                           to_bits((lowest > packet.greatest) & (highest < begin));
+    const LaneBits found =
+        possible & sides.certain & to_bits((lowest > packet.greatest) & (highest < begin));
     const auto nearer = from_bits<FloatPacket>(found);
     packet.found |= found;
     if constexpr (query == Query::any) {

@@ -76,8 +76,8 @@ private:
     Counters &counters_;
     BeamBudget budget_;
     uint32_t blocks_ = 0; // tested
-    bool dense_ = false; // whether there are many triangles
-    RayGrid grid_;       // where there are
+    bool dense_ = false;  // whether there are many triangles
+    RayGrid grid_;        // where there are
     // Packets of the beam that triangles of a block may touch: its CAPACITY times the
     // number of the triangle plus that of the packet. What is written there comes in whole
     // packets.

@@ -26,8 +26,8 @@ constexpr float UNDERFLOW = 0x1p-146f;
 // difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
 // have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
 // a rectangle two roundings lead to the form's value at the center, three to its change
-// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S; 40 covers
-// products of roundings and the bound itself.
+// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S; 40
+// covers products of roundings and the bound itself.
 constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
 // Depth: N comes from double precision, where thin triangles keep its digits. With n its
 // largest component, 12 roundings of at most n S are left, and that of the bound.
@@ -140,8 +140,9 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
 
 template <typename Real, typename Bounds, typename ValueOf>
 Real TriangleForms::middle(int form, const Bounds &bounds, ValueOf &&value_of) const {
-    return fused(value_of(of_p[form]), Real(bounds.center_p),
-                 fused(value_of(of_q[form]), Real(bounds.center_q), value_of(center[form])));
+    return fused(
+        value_of(of_p[form]), Real(bounds.center_p),
+        fused(value_of(of_q[form]), Real(bounds.center_q), value_of(center[form])));
 }
 
 template <typename Real, typename Bounds, typename ValueOf>
@@ -193,9 +194,7 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
     // Without branches: nobody foresees where triangles lie.
     Coverage packets;
     packets.possible = to_bits(may_hit(run, load<FloatPacket>(run.least), value_of));
-    const auto least_of = [&](int form) {
-        return least<FloatPacket>(form, run, value_of);
-    };
+    const auto least_of = [&](int form) { return least<FloatPacket>(form, run, value_of); };
     const FloatPacket edges = minimum(least_of(0), minimum(least_of(1), least_of(2)));
     const auto inside = edges > (EXACT ? value_of(edge_error) : FloatPacket(0.0f));
     packets.least = least_of(DEPTH);

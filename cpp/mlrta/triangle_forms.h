@@ -35,8 +35,8 @@ struct alignas(64) TriangleForms {
     // value = constant + u * of_u + v * of_v
     Lanes constant[4], of_u[4], of_v[4];
 
-    // The same over the beam's rectangle: value = center + p * of_p + q * of_q; and how much
-    // a form changes by unit of half a rectangle's sides.
+    // The same over the beam's rectangle: value = center + p * of_p + q * of_q; and how
+    // much a form changes by unit of half a rectangle's sides.
     Lanes center[4], of_p[4], of_q[4];
     Lanes size_p[4], size_q[4];
 
