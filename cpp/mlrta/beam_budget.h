@@ -1,6 +1,8 @@
 // How many triangles a beam may be tested against before it is given up.
 #pragma once
 
+#include "base/check.h"
+
 #include <cstdint>
 #include <limits>
 
@@ -32,7 +34,7 @@ public:
         finds_little_ = float(count_found()) < least_yield_ * float(tested_);
     }
 
-    uint32_t tested() const { return tested_; }
+    uint64_t tested() const { return tested_; }
     // Whether the beam had better be given up.
     bool spent() const { return tested_ >= most_triangles_ || finds_little_; }
 

@@ -2,6 +2,7 @@
 
 #include "base/exactness.h"
 #include "geometry/triangle_test.h"
+#include "mlrta/block_pairs.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
 #include "traverse/single.h"
@@ -36,34 +37,6 @@ bool in_one_plane(const Triangle &one, const Triangle &other) {
     const auto is_of_one = [&](Vec3f v) { return v == one.a || v == one.b || v == one.c; };
     return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
 }
-
-// Pairs of a triangle of a block and a run, or a packet, of a beam, are numbered: CAPACITY
-// times the triangle's lane plus the first packet.
-constexpr uint32_t lane_of_pair(uint32_t pair) {
-    return pair / BeamPackets::CAPACITY;
-}
-constexpr uint32_t run_of(uint32_t pair) {
-    return pair % BeamPackets::CAPACITY / PACKET_WIDTH;
-}
-
-class RunPairs {
-public:
-    // Adds those of a run with the triangles in the given lanes.
-    void add(uint32_t run, LaneBits triangles) {
-        store_compressed(pairs_.data() + count_,
-                         lane_indices() * BeamPackets::CAPACITY +
-                             UIntPacket(run * PACKET_WIDTH),
-                         triangles);
-        count_ += uint32_t(std::popcount(triangles));
-    }
-
-    std::span<const uint32_t> all() const { return {pairs_.data(), count_}; }
-
-private:
-    // What is written comes in whole packets.
-    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + PACKET_WIDTH> pairs_;
-    uint32_t count_ = 0;
-};
 
 FloatPacket value_of(const TriangleForms &forms, int form, uint32_t lane,
                      const BeamPacket &packet) {
@@ -158,7 +131,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     };
     bool any_covered = false;
     for (const uint32_t first : of_large.all()) {
-        const uint32_t n = run_of(first), lane = lane_of_pair(first);
+        const uint32_t n = run_of_pair(first), lane = lane_of_pair(first);
         const auto coverage = forms.coverage_of(lane, beam_, beam_.runs[n]);
         const LaneBits packets = coverage.possible & ~coverage.covered;
         in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
@@ -169,7 +142,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         add_pairs(first, packets);
     }
     for (const uint32_t first : of_small.all()) {
-        const uint32_t n = run_of(first);
+        const uint32_t n = run_of_pair(first);
         const LaneBits packets = forms.packets_for(lane_of_pair(first), beam_.runs[n]);
         in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
         add_pairs(first, packets);
@@ -181,8 +154,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     uint64_t changed = 0;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
-        const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
-                       lane = lane_of_pair(pairs_[i]);
+        const uint32_t n = packet_of_pair(pairs_[i]), lane = lane_of_pair(pairs_[i]);
         const LaneBits found = test_packet(n, forms, lane, numbers[lane], sides_[i]);
         changed |= uint64_t(found) << n;
         hit |= found << lane;
@@ -235,7 +207,7 @@ uint32_t BeamTriangleTests<query>::packets_inside(const TriangleForms &forms,
     uint32_t kept = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t pair = pairs_[i], lane = lane_of_pair(pair);
-        const BeamPacket &packet = beam_.packets[pair % BeamPackets::CAPACITY];
+        const BeamPacket &packet = beam_.packets[packet_of_pair(pair)];
         const auto value = [&](int form) { return value_of(forms, form, lane, packet); };
         const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
         const FloatPacket error(EXACT ? forms.edge_error[lane] : 0.0f);

@@ -78,9 +78,8 @@ private:
     uint32_t blocks_ = 0; // tested
     bool dense_ = false;  // whether there are many triangles
     RayGrid grid_;        // where there are
-    // Packets of the beam that triangles of a block may touch: its CAPACITY times the
-    // number of the triangle plus that of the packet. What is written there comes in whole
-    // packets.
+    // Packets of the beam that triangles of a block may touch; see block_pairs.h. What is
+    // written there comes in whole packets.
     std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
     std::array<EdgeSides, WIDE_WIDTH * BeamPackets::CAPACITY> sides_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;

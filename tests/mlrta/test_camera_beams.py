@@ -226,7 +226,7 @@ def test_rays_that_differ_in_their_ends_are_looked_at(core: ModuleType) -> None:
 @each_core
 def test_covered_packets_are_hit_by_all_rays(core: ModuleType) -> None:
     rng = np.random.default_rng(SEED)
-    covered = 0
+    covered = too_small = 0
     for _ in range(40):
         tile = random_tile(rng, int(rng.choice([1, 4, 16])), 8)
         count = min(tile.count, 256)
@@ -239,14 +239,18 @@ def test_covered_packets_are_hit_by_all_rays(core: ModuleType) -> None:
             corners = tile.origin + ahead + rng.uniform(-size, size, (3, 3))
             triangles.append(np.float32(corners))
         vertices = np.ascontiguousarray(np.concatenate(triangles), np.float32)
-        for number, packet, least, greatest in beam.covered_packets(vertices):
+        forms = beam.forms(vertices)
+        too_small += (forms["possible"] & ~forms["possible_covers"]).bit_count()
+        for number, packet, least, greatest, is_large in beam.covered_packets(vertices):
             covered += 1
+            assert is_large, (SEED, number)
             for ray in range(16 * packet, 16 * packet + 16):
                 direction = tile.directions[ray]
                 depth = hit_depth(tile.origin, direction, triangles[number], told)
                 assert depth is not None, (SEED, number, ray)
                 assert Fraction(least) <= 1 / depth <= Fraction(greatest), (SEED, ray)
     assert covered > 300, (SEED, covered)
+    assert too_small > 10, (SEED, too_small)
 
 
 def hit_depth(
