@@ -31,7 +31,7 @@ public:
             return;
         while (next_look_ <= tested_)
             next_look_ *= 2;
-        finds_little_ = float(count_found()) < least_yield_ * float(tested_);
+        finds_little_ |= float(count_found()) < least_yield_ * float(tested_);
     }
 
     uint64_t tested() const { return tested_; }

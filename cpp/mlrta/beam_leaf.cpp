@@ -197,8 +197,9 @@ bool BeamWalk<query>::walk(const Entry &entry) {
         for (;;) {
             if (pending == 0)
                 tests_.flush();
+            // What went beyond the budget was not tested, unless any hit will do.
             if (pending == 0 || tests_.all_done())
-                return true;
+                return query == Query::any || !tests_.spent();
             const Pending &next = stack[--pending];
             if (next.depths.near > tests_.far_end() || beside(next.cell))
                 continue;

@@ -1,6 +1,7 @@
 #include "mlrta/beam_triangle_tests.h"
 
 #include "base/exactness.h"
+#include "geometry/one_plane.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/block_pairs.h"
 #include "traverse/load_packet.h"
@@ -24,18 +25,6 @@ constexpr uint32_t BLOCKS_AT_ONCE = 4;
 
 Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-}
-
-// Whether two triangles, if both have an area, certainly lie in one plane: one across an
-// axis, or that of the same three vertices. Surfaces that were modelled twice do.
-bool in_one_plane(const Triangle &one, const Triangle &other) {
-    for (int k = 0; k < 3; ++k) {
-        const float at = one.a[k];
-        if (one.b[k] == at && one.c[k] == at)
-            return other.a[k] == at && other.b[k] == at && other.c[k] == at;
-    }
-    const auto is_of_one = [&](Vec3f v) { return v == one.a || v == one.b || v == one.c; };
-    return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
 }
 
 FloatPacket value_of(const TriangleForms &forms, int form, uint32_t lane,
@@ -101,6 +90,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const uint32_t tested = uint32_t(std::popcount(forms.possible | forms.unsafe));
     counters_.beam_triangles += tested;
     budget_.spend(tested, [&] { return beam_.found_count(); });
+    if (query == Query::closest && spent())
+        return; // nobody will look at what is found
     if (budget_.tested() > DENSE_TRIANGLES && !dense_) {
         beam_.load_slopes(rays_);
         grid_.fill(beam_);
@@ -111,9 +102,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
-    LaneBits large = 0;
-    if constexpr (query == Query::closest)
-        large = forms.possible_covers(beam_);
+    const LaneBits large = query == Query::closest ? forms.possible_covers(beam_) : 0;
     RunPairs of_large, of_small;
     for (uint32_t n = 0; n < beam_.run_count(); ++n) {
         const LaneBits triangles =
@@ -123,8 +112,9 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         of_small.add(n, triangles & ~large);
     }
     uint32_t pairs = 0;
-    uint64_t in_pairs = 0; // packets
+    BeamPackets::Packets in_pairs;
     const auto add_pairs = [&](uint32_t first, LaneBits packets) {
+        in_pairs.run(run_of_pair(first)) |= packets;
         store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
                          packets);
         pairs += uint32_t(std::popcount(packets));
@@ -134,7 +124,6 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         const uint32_t n = run_of_pair(first), lane = lane_of_pair(first);
         const auto coverage = forms.coverage_of(lane, beam_, beam_.runs[n]);
         const LaneBits packets = coverage.possible & ~coverage.covered;
-        in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
         if (coverage.covered != 0) {
             cover(n, coverage, forms, lane, numbers[lane]);
             any_covered = true;
@@ -142,29 +131,30 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         add_pairs(first, packets);
     }
     for (const uint32_t first : of_small.all()) {
-        const uint32_t n = run_of_pair(first);
-        const LaneBits packets = forms.packets_for(lane_of_pair(first), beam_.runs[n]);
-        in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
-        add_pairs(first, packets);
+        const BeamPackets::Run &run = beam_.runs[run_of_pair(first)];
+        add_pairs(first, forms.packets_for(lane_of_pair(first), run));
     }
     counters_.triangle_tests += pairs;
     if constexpr (query == Query::closest)
-        beam_.settle(rays_, in_pairs);
+        for (uint32_t n = 0; n < beam_.run_count(); ++n)
+            beam_.settle(rays_, n, in_pairs.run(n));
     pairs = packets_inside(forms, pairs);
-    uint64_t changed = 0;
+    BeamPackets::Packets changed;
+    bool any_changed = false;
     LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = packet_of_pair(pairs_[i]), lane = lane_of_pair(pairs_[i]);
         const LaneBits found = test_packet(n, forms, lane, numbers[lane], sides_[i]);
-        changed |= uint64_t(found) << n;
+        changed.run(n / PACKET_WIDTH) |= found << n % PACKET_WIDTH;
         hit |= found << lane;
+        any_changed |= found != 0;
     }
     if constexpr (query == Query::any)
         for_each_lane(hit, [&](uint32_t lane) {
             if (hit_count_ < hit_.size())
                 hit_[hit_count_++] = numbers[lane];
         });
-    if (changed != 0)
+    if (any_changed)
         update_least(changed);
     else if (any_covered)
         update_least();
@@ -186,7 +176,7 @@ void BeamTriangleTests<query>::cover(uint32_t number,
     raise(run.greatest, coverage.greatest);
     run.all.least = least_lane(load<FloatPacket>(run.least));
     const uint32_t first = number * PACKET_WIDTH;
-    beam_.covered |= uint64_t(coverage.covered) << first;
+    beam_.covered.run(number) |= coverage.covered;
     constexpr int DEPTH = TriangleForms::DEPTH;
     const BeamPackets::Cover cover{primitive,
                                    forms.constant[DEPTH][lane],
@@ -241,7 +231,7 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
     const LaneBits found =
         possible & sides.certain & to_bits((lowest > packet.greatest) & (highest < begin));
     const auto nearer = from_bits<FloatPacket>(found);
-    packet.found |= found;
+    beam_.lanes[number].found |= found;
     if constexpr (query == Query::any) {
         packet.least = select(nearer, FloatPacket(INFINITE), packet.least);
     } else {
@@ -252,21 +242,23 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
     }
     const LaneBits open = EXACT ? possible & ~found : 0;
     if (open != 0) [[unlikely]]
-        decide(packet, open, sides.certain, primitive);
+        decide(number, open, sides.certain, primitive);
     return (found | open) != 0;
 }
 
 // By the contract of geometry/triangle_test.h.
 template <Query query>
-void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
+void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes,
                                       LaneBits certain_hits, uint32_t primitive) {
     if (query == Query::any && beam_.parallel) {
-        decide_parallel(packet, lanes, certain_hits, primitive);
+        decide_parallel(number, lanes, certain_hits, primitive);
         return;
     }
+    BeamPacket &packet = beam_.packets[number];
+    PacketLanes &of_rays = beam_.lanes[number];
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
-    for_each_value(packet.primitive, lanes & packet.found,
+    for_each_value(packet.primitive, lanes & of_rays.found,
                    [&](uint32_t rival, LaneBits holders) {
                        if (rival != primitive && !in_one_plane(tree_.triangles[rival],
                                                                tree_.triangles[primitive]))
@@ -280,38 +272,39 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
     LaneBits hits = lanes & certain_hits;
     for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
         const HitDecision decision =
-            decide_hit(beam_.origin, direction_of(rays_, packet.first_ray + lane),
+            decide_hit(beam_.origin, direction_of(rays_, of_rays.first_ray + lane),
                        tree_.triangles[primitive]);
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
-    const UIntPacket number(primitive);
+    const UIntPacket challenger(primitive);
     tied &= hits;
-    packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
+    packet.primitive = select(from_bits<UIntPacket>(tied), challenger, packet.primitive);
     hits &= ~tied;
     if (hits == 0)
         return;
 
     const auto distances = [&](LaneBits of, const UIntPacket &primitives) {
-        return distances_.of(rays_, packet.first_ray, of, primitives, counters_);
+        return distances_.of(rays_, of_rays.first_ray, of, primitives, counters_);
     };
-    const FloatPacket t = distances(hits, number);
-    const FloatPacket t_min = load_padded(rays_.t_min, packet.first_ray, rays_.count);
-    const FloatPacket t_max = load_padded(rays_.t_max, packet.first_ray, rays_.count);
+    const FloatPacket t = distances(hits, challenger);
+    const FloatPacket t_min = load_padded(rays_.t_min, of_rays.first_ray, rays_.count);
+    const FloatPacket t_max = load_padded(rays_.t_max, of_rays.first_ray, rays_.count);
     hits &= to_bits((t > maximum(t_min, FloatPacket(0.0f))) & (t < INFINITE));
-    if (const LaneBits rivals = hits & packet.found; rivals != 0) {
+    if (const LaneBits rivals = hits & of_rays.found; rivals != 0) {
         const FloatPacket other = distances(rivals, packet.primitive);
         const LaneBits nearer =
-            to_bits(t < other) | (to_bits(t == other) & to_bits(number < packet.primitive));
+            to_bits(t < other) |
+            (to_bits(t == other) & to_bits(challenger < packet.primitive));
         hits &= nearer | ~rivals;
     }
-    hits &= to_bits(t <= t_max) | packet.found;
+    hits &= to_bits(t <= t_max) | of_rays.found;
     if (hits == 0)
         return;
 
-    packet.found |= hits;
+    of_rays.found |= hits;
     const auto mask = from_bits<FloatPacket>(hits);
-    packet.primitive = select(from_bits<UIntPacket>(hits), number, packet.primitive);
+    packet.primitive = select(from_bits<UIntPacket>(hits), challenger, packet.primitive);
     if constexpr (query == Query::any) {
         packet.least = select(mask, FloatPacket(INFINITE), packet.least);
         return;
@@ -319,7 +312,7 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
     // denormal.
     const DoublePacket main = absolute(to_double(
-        load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count)));
+        load_padded(rays_.direction[beam_.axes[2]], of_rays.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
     packet.least =
@@ -331,13 +324,15 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
 
 // The same for rays that each have an origin, of Query::any.
 template <Query query>
-void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lanes,
+void BeamTriangleTests<query>::decide_parallel(uint32_t number, LaneBits lanes,
                                                LaneBits certain_hits, uint32_t primitive) {
     counters_.double_tests += uint64_t(std::popcount(lanes));
     const Triangle &triangle = tree_.triangles[primitive];
+    BeamPacket &packet = beam_.packets[number];
+    PacketLanes &of_rays = beam_.lanes[number];
     LaneBits hits = 0;
     for_each_lane(lanes, [&](uint32_t lane) {
-        const Ray ray = ray_of(rays_, packet.first_ray + lane);
+        const Ray ray = ray_of(rays_, of_rays.first_ray + lane);
         if ((certain_hits >> lane & 1) == 0) {
             const HitDecision decision = decide_hit(ray.origin, ray.direction, triangle);
             counters_.exact_tests += decision.precision == Precision::exact;
@@ -348,7 +343,7 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
         hits |= LaneBits(t > std::max(ray.t_min, 0.0f) && t <= ray.t_max && t < INFINITE)
                 << lane;
     });
-    packet.found |= hits;
+    of_rays.found |= hits;
     packet.least =
         select(from_bits<FloatPacket>(hits), FloatPacket(INFINITE), packet.least);
 }
@@ -356,20 +351,21 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
-    beam_.settle(rays_, ~uint64_t(0));
+    for (uint32_t n = 0; n < beam_.run_count(); ++n)
+        beam_.settle(rays_, n, ALL_LANES);
     for (uint32_t n = 0; n < beam_.count; ++n) {
-        BeamPacket &packet = beam_.packets[n];
-        decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
+        const LaneBits searching = to_bits(beam_.packets[n].least < INFINITE);
+        decide(n, beam_.lanes[n].active & searching, 0, primitive);
     }
     counters_.triangle_tests += beam_.count;
-    update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));
+    update_least(BeamPackets::Packets::of_first(beam_.count));
 }
 
 // After some packets have found something.
 template <Query query>
-void BeamTriangleTests<query>::update_least(uint64_t packets) {
-    for (uint32_t n = 0; n < beam_.run_count(); ++n, packets >>= PACKET_WIDTH) {
-        const LaneBits changed = LaneBits(packets) & ALL_LANES;
+void BeamTriangleTests<query>::update_least(const BeamPackets::Packets &packets) {
+    for (uint32_t n = 0; n < beam_.run_count(); ++n) {
+        const LaneBits changed = packets.run(n);
         if (changed == 0)
             continue;
         BeamPackets::Run &run = beam_.runs[n];

@@ -28,7 +28,7 @@ def test_budgets_end_at_most_triangles_or_where_little_is_found(core: ModuleType
         for step, is_spent in enumerate(told):
             before, now = sum(triangles[:step]), sum(triangles[: step + 1])
             if any(before < look <= now for look in looks):
-                little = found[step] < least_yield * now
+                little |= found[step] < least_yield * now
             assert is_spent == (now >= most or little), (SEED, step)
             by_count += now >= most
             by_yield += now < most and little
