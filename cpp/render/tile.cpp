@@ -69,6 +69,7 @@ void TileRenderer::make_room() {
         channel.assign(padded, 0.0f);
     if (target_.cost)
         cost_.assign(padded, 0.0f);
+    reflected_.clear();
     for (ShadowRays &shadow : shadows_)
         shadow.clear();
     if (bsdf_rays_)
@@ -234,7 +235,8 @@ void TileRenderer::add_reflected_light() {
                                          values_[2].data()};
     for (ShadowRays &shadow : shadows_)
         shadow.trace(scene_.data, shadow.from_light() ? options_.together : options_.alone,
-                     counters_.shadow, cost, colours);
+                     counters_.shadow, cost, reflected_);
+    reflected_.add_to(colours);
     if (bsdf_rays_)
         bsdf_rays_->trace(options_.alone, counters_.bsdf, cost, colours);
 }

@@ -14,6 +14,7 @@
 #include "render/picture_film.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
+#include "render/reflected_light.h"
 #include "render/sampler.h"
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
@@ -175,6 +176,7 @@ private:
     AlignedVector<float> cost_;                // if it is wanted
     std::vector<AlignedVector<float>> values_; // by channel of the film
 
+    ReflectedLight reflected_;
     std::vector<ShadowRays> shadows_; // one an emitter
     SampleShares shares_;
     uint32_t bsdf_samples_;
