@@ -323,6 +323,8 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
 }
 
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
+    if (scene.few_points)
+        return choose_few_points(scene, x);
     const uint32_t count = uint32_t(scene.data.emitters.size());
     if (count == 1)
         return {UIntPacket(0u), FloatPacket(1.0f), x};
@@ -350,7 +352,7 @@ EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 LaneBits lanes,
                                                 const Vec3<FloatPacket> &p) {
     if (scene.few_points)
-        return from_point(lights_of(*scene.few_points, choices.emitter), choices.weight, p);
+        return from_point(lights_of(scene.few_points->lights, choices.emitter), choices.weight, p);
     const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
     PointLight<FloatPacket> lights = lights_in_all_lanes(scene.emitter_tables[first].point);
     const LaneBits others = lanes & ~to_bits(choices.emitter == UIntPacket(first));

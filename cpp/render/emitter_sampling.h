@@ -2,6 +2,7 @@
 // for sixteen side by side with the same operations and hence the same bits.
 #pragma once
 
+#include "base/look_up.h"
 #include "base/simd.h"
 #include "render/prepared_scene.h"
 #include "render/surface.h"
@@ -35,6 +36,20 @@ struct EmitterChoices {
     FloatPacket x;      // made uniform again; any value if all emitters are points
 };
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x);
+
+// The same of a scene with few_points.
+inline EmitterChoices choose_few_points(const PreparedScene &scene, const FloatPacket &x) {
+    const uint32_t count = uint32_t(scene.data.emitters.size());
+    UIntPacket emitter(0u);
+    if (count > 1 && !scene.emitter_choice.empty()) {
+        emitter = scene.emitter_choice.index_of(x);
+    } else if (count > 1) {
+        // Truncated, as conversion to an integer does; x < 1 may round up to the count.
+        emitter = UIntPacket(minimum(FloatPacket(UIntPacket(x * FloatPacket(float(count)))),
+                                     FloatPacket(float(count - 1))));
+    }
+    return {emitter, look_up(scene.few_points->choice_weights, emitter), x};
+}
 
 // `density`, if given, is set where there is light: per solid angle at p, the choice of the
 // emitter included; infinity for light that comes from one direction.

@@ -22,14 +22,14 @@ public:
     // Light for the camera rays of the hits; any value in lanes that are never shown.
     // Returns the packet's number.
     uint32_t add(const HitPacket &hit, const Vec3<FloatPacket> &light) {
-        if (count_ == packets_.size())
-            packets_.resize(std::max<size_t>(PACKET_WIDTH, 2 * packets_.size()));
-        Packet &packet = packets_[count_];
-        packet.light = light;
-        packet.first = hit.first;
-        packet.shown = 0;
-        if (!hit.first)
-            packet.rays = hit.ray;
+        if (hit.first)
+            return add(*hit.first, light);
+        packet_to_set(light).rays = hit.ray;
+        return count_++;
+    }
+    // The same for rays that follow each other from the first one on.
+    uint32_t add(size_t first, const Vec3<FloatPacket> &light) {
+        packet_to_set(light).first = first;
         return count_++;
     }
 
@@ -52,6 +52,16 @@ private:
         std::optional<size_t> first; // camera ray in lane 0, if they do
         LaneBits shown;
     };
+    Packet &packet_to_set(const Vec3<FloatPacket> &light) {
+        if (count_ == packets_.size())
+            packets_.resize(std::max<size_t>(PACKET_WIDTH, 2 * packets_.size()));
+        Packet &packet = packets_[count_];
+        packet.light = light;
+        packet.first = std::nullopt;
+        packet.shown = 0;
+        return packet;
+    }
+
     uint32_t count_ = 0;
     std::vector<Packet> packets_; // and more, to be overwritten
 };

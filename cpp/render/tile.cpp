@@ -38,6 +38,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
         factors_.push_back(std::numbers::inv_pi_v<float> / shared_by);
         factors_differ_ |= factors_.back() != factors_.front();
     }
+    plain_ = shades_plainly();
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);
     for (ShadedPacket &packet : packets_)
@@ -136,17 +137,19 @@ void TileRenderer::add_background() {
 // that wait for each other, of which a processor works on several only if they are short.
 void TileRenderer::shade_hits() {
     const bool common_origin = scene_.plane.has_common_origin();
-    const size_t at_once = packets_.size() * PACKET_WIDTH;
+    const size_t at_once = AT_ONCE * PACKET_WIDTH;
     for (size_t begin = 0; begin < samples_.count(); begin += at_once) {
         const size_t end = std::min(begin + at_once, samples_.count());
         size_t count = 0;
         for (size_t first = begin; first < end; first += PACKET_WIDTH) {
+            const auto faces = load<UIntPacket>(&primitive_[first]);
+            const LaneBits hits = to_bits(faces != UIntPacket(NO_PRIMITIVE));
+            if (hits == 0 || (plain_ && find_plain_packet(first, faces, hits)))
+                continue;
             ShadedPacket &packet = packets_[count];
             HitPacket &hit = packet.hit;
-            hit.faces = load<UIntPacket>(&primitive_[first]);
-            hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
-            if (hit.lanes == 0)
-                continue;
+            hit.faces = faces;
+            hit.lanes = hits;
             ++count;
             hit.ray = UIntPacket(uint32_t(first)) + lane_indices();
             for (int k = 0; k < 3; ++k)
@@ -162,6 +165,7 @@ void TileRenderer::shade_hits() {
             new (&packet.point)
                 SurfacePoint<FloatPacket>(surface_of(scene_, faces_, hit, common_origin));
         }
+        shade_plain_packets();
         const std::span packets = std::span(packets_).first(count);
         for (const ShadedPacket &packet : packets)
             write_depth_and_normal(packet.hit, packet.point, *packet.hit.first);

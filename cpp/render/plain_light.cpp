@@ -1,0 +1,115 @@
+// Shading of packets whose rays all meet one face of one colour, in scenes with few lights:
+// what most packets of most scenes are. The same light as in emitter_light.cpp, bit for bit;
+// what all lanes have in common is a number here, and nothing but the result is stored.
+#include "render/emitter_sampling.h"
+#include "render/point_on_face.h"
+#include "render/tile.h"
+
+namespace mlrt {
+
+namespace {
+
+struct PlainLight {
+    Vec3<FloatPacket> weight, direction, target; // as of an EmitterSample
+};
+
+[[gnu::always_inline]] inline PlainLight from_few_points(const PreparedScene &scene,
+                                                         const EmitterChoices &choices,
+                                                         const Vec3<FloatPacket> &p) {
+    const auto light = lights_of(scene.few_points->lights, choices.emitter);
+    const PointLightSample<FloatPacket> point = sample_point_light(light, p);
+    const FloatPacket factor = point.factor * choices.weight;
+    return {by_axis([&](int k) {
+                return select(point.has_light, factor * light.intensity[k],
+                              FloatPacket(0.0f));
+            }),
+            point.direction, light.position};
+}
+
+} // namespace
+
+bool TileRenderer::shades_plainly() const {
+    return offset_ == ShadowOffset::mitsuba && bsdf_samples_ == 0 && !scene_.data.objects &&
+           scene_.plane.has_common_origin() && target_.channels.depth < 0 &&
+           target_.channels.normal < 0 && !shadows_.empty() &&
+           (scene_.few_points || shadows_.size() == 1);
+}
+
+// False if it is none: if there are several faces, or sides of one, or if the face glows or
+// has a texture.
+bool TileRenderer::find_plain_packet(size_t first, const UIntPacket &faces, LaneBits hits) {
+    const uint32_t number = primitive_[first + uint32_t(__builtin_ctz(hits))];
+    if ((hits & ~to_bits(faces == UIntPacket(number))) != 0)
+        return false;
+    const uint32_t shape = scene_.shape_of_face[number];
+    const Material &material = scene_.shape_materials[shape];
+    if (scene_.data.shapes[shape].emitter != NONE || material.is_textured())
+        return false;
+
+    const FloatPacket zero(0.0f);
+    const Vec3<FloatPacket> direction{load<FloatPacket>(samples_.direction(0) + first),
+                                      load<FloatPacket>(samples_.direction(1) + first),
+                                      load<FloatPacket>(samples_.direction(2) + first)};
+    const HitFace &face = faces_.of(number);
+    const SurfacePoint<FloatPacket> point = point_on(direction, face);
+    const FloatPacket cos_view = -dot(direction, point.shading_normal);
+    const LaneBits lanes = hits & to_bits(cos_view != zero);
+    const LaneBits front = lanes & to_bits(cos_view > zero);
+    if (front != 0 && front != lanes)
+        return false;
+    const Vec3f colour = front != 0 ? material.front : material.back;
+    if (lanes == 0 || colour == Vec3f{})
+        return true;
+    PlainPacket &packet = plain_packets_[plain_count_++];
+    packet.first = first;
+    packet.lanes = lanes;
+    packet.front = front != 0;
+    packet.colour = colour;
+    packet.face_normal = face.parts.normal;
+    packet.p = point.p;
+    packet.shading_normal = point.shading_normal;
+    return true;
+}
+
+void TileRenderer::shade_plain_packets() {
+    const std::span packets = std::span(plain_packets_).first(plain_count_);
+    plain_count_ = 0;
+    const FloatPacket zero(0.0f);
+    const auto reflect = [&](PlainPacket &packet, const PlainLight &light) {
+        const FloatPacket cosine = dot(light.direction, packet.shading_normal);
+        const FloatPacket cos_light = packet.front ? cosine : -cosine;
+        packet.lit = packet.lanes & not_black(light.weight) & to_bits(cos_light > zero);
+        packet.target = light.target;
+        packet.start = offset_point(packet.p, in_all_lanes(packet.face_normal),
+                                    light.target - packet.p);
+        const FloatPacket share = FloatPacket(factors_[0]) * cos_light;
+        packet.number = reflected_.add(
+            packet.first, (in_all_lanes(packet.colour) * share) * light.weight);
+    };
+    for (uint32_t sample = 0; sample < emitter_samples_; ++sample) {
+        for (PlainPacket &packet : packets) {
+            const auto x = load<FloatPacket>(samples_.light_x(sample) + packet.first);
+            if (scene_.few_points) {
+                const EmitterChoices choices = choose_few_points(scene_, x);
+                packet.emitters = choices.emitter;
+                reflect(packet, from_few_points(scene_, choices, packet.p));
+                continue;
+            }
+            const auto y = load<FloatPacket>(samples_.light_y(sample) + packet.first);
+            const EmitterSample<FloatPacket> light = sample_chosen(
+                scene_, 0, {UIntPacket(0u), FloatPacket(1.0f), x}, packet.p, y);
+            reflect(packet, {light.weight, light.direction, light.target});
+        }
+        for (const PlainPacket &packet : packets) {
+            const auto append = [&](uint32_t emitter, LaneBits lit) {
+                shadows_[emitter].append(lit, packet.number, packet.start, packet.target);
+            };
+            if (shadows_.size() > 1)
+                for_each_value(packet.emitters, packet.lit, append);
+            else if (packet.lit != 0)
+                append(0, packet.lit);
+        }
+    }
+}
+
+} // namespace mlrt
