@@ -47,9 +47,7 @@ bool TileRenderer::find_plain_packet(size_t first, const UIntPacket &faces, Lane
         return false;
 
     const FloatPacket zero(0.0f);
-    const Vec3<FloatPacket> direction{load<FloatPacket>(samples_.direction(0) + first),
-                                      load<FloatPacket>(samples_.direction(1) + first),
-                                      load<FloatPacket>(samples_.direction(2) + first)};
+    const Vec3<FloatPacket> direction = samples_.directions(first);
     const HitFace &face = faces_.of(number);
     const SurfacePoint<FloatPacket> point = point_on(direction, face);
     const FloatPacket cos_view = -dot(direction, point.shading_normal);

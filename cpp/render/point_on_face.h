@@ -64,7 +64,8 @@ Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Part> &n,
 // Mitsuba 3.9's mesh.cpp, compute_surface_interaction. Normals of vertices are zeros where
 // the face normal serves; there need be none if it does everywhere.
 template <typename Real, typename Part>
-SurfacePoint<Real> point_at(const Vec2<Real> &at, const Corners<Part> &corners,
+[[gnu::always_inline]] inline SurfacePoint<Real>
+point_at(const Vec2<Real> &at, const Corners<Part> &corners,
                             const Vec3<Part> &face_normal, const Corners<Part> *normals) {
     const Vec3<Real> normal(face_normal);
     return {interpolate(corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
@@ -72,7 +73,8 @@ SurfacePoint<Real> point_at(const Vec2<Real> &at, const Corners<Part> &corners,
 }
 
 template <typename Real>
-SurfacePoint<Real> point_on(const Vec3<Real> &direction, const HitFace &face) {
+[[gnu::always_inline]] inline SurfacePoint<Real> point_on(const Vec3<Real> &direction,
+                                                          const HitFace &face) {
     return point_at(weights_of<Real>(products_of(to_double(direction), face.parts.weights)),
                     face.parts.corners, face.parts.normal,
                     face.vertex_normals ? &face.normals : nullptr);

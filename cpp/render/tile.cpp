@@ -125,9 +125,7 @@ void TileRenderer::add_background() {
             continue;
         const auto mask = from_bits<FloatPacket>(misses);
         const Vec3<FloatPacket> light =
-            scene_.environment.radiance({load<FloatPacket>(samples_.direction(0) + first),
-                                         load<FloatPacket>(samples_.direction(1) + first),
-                                         load<FloatPacket>(samples_.direction(2) + first)});
+            scene_.environment.radiance(samples_.directions(first));
         for (int k = 0; k < 3; ++k)
             store(&values_[size_t(k)][first], select(mask, light[k], FloatPacket(0.0f)));
     }
@@ -152,8 +150,7 @@ void TileRenderer::shade_hits() {
             hit.lanes = hits;
             ++count;
             hit.ray = UIntPacket(uint32_t(first)) + lane_indices();
-            for (int k = 0; k < 3; ++k)
-                hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
+            hit.direction = samples_.directions(first);
             for (int k = 0; k < 3 && !common_origin; ++k)
                 hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
             hit.first = first;
