@@ -1,6 +1,7 @@
 #include "render/emitter_sampling.h"
 
 #include "render/analytic_emitter.h"
+#include "render/area_light.h"
 #include "render/point_light.h"
 #include "render/textured_light.h"
 
@@ -93,13 +94,10 @@ template <typename Real>
     return point;
 }
 
-// Mitsuba's rectangle.cpp, sample_position.
 template <typename Real>
 AreaPoint<Real> sample_rectangle(const Emitter &emitter, const Shape &shape,
                                  const EmitterTable &table, const Real &x, const Real &y) {
-    return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
-                y * spread<Real>(emitter.edge_v),
-            spread<Real>(table.normal), all_of<Real>(shape.first_face)};
+    return {point_on_rectangle(emitter, x, y), spread<Real>(table.normal), all_of<Real>(shape.first_face)};
 }
 
 // A point of an analytic shape that glows, with its density by solid angle.
@@ -235,7 +233,6 @@ EmitterSample<Real> from_surface(const PreparedScene &scene, uint32_t number,
     const Emitter &emitter = scene.data.emitters[number];
     const EmitterTable &table = scene.emitter_tables[number];
     const Shape &shape = scene.data.shapes[emitter.shape];
-    const Real zero(0.0f), one(1.0f);
     AreaPoint<Real> point;
     Real by_area(table.inverse_area);
     Vec3<Real> radiance = spread<Real>(emitter.radiance);
@@ -249,19 +246,15 @@ EmitterSample<Real> from_surface(const PreparedScene &scene, uint32_t number,
     } else {
         point = sample_mesh(scene, shape, table, x, y);
     }
-    const Vec3<Real> to_light = point.p - p;
-    const Real squared = dot(to_light, to_light);
-    const Vec3<Real> direction = to_light * (one / square_root(squared));
-    const Real cosine = dot(direction, point.normal);
-    const Real by_direction = by_area * (squared / -cosine);
-    // False also for a point on the light itself, where the direction is not a number.
-    const MaskOf<Real> has_light =
-        (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
-    const Real factor = choice_weight / by_direction;
+    const AreaLightSample<Real> light =
+        sample_area_light(point.p, point.normal, by_area, p);
+    const Real factor = choice_weight / light.density;
     if (density)
-        *density = by_direction / choice_weight;
-    return {by_axis([&](int k) { return select(has_light, factor * radiance[k], zero); }),
-            direction, point.p, point.face};
+        *density = light.density / choice_weight;
+    return {by_axis([&](int k) {
+                return select(light.has_light, factor * radiance[k], Real(0.0f));
+            }),
+            light.direction, point.p, point.face};
 }
 
 // Light of one emitter; choice_weight is 1 / the probability that it was chosen. `density`

@@ -64,6 +64,13 @@ EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 const EmitterChoices &choices,
                                                 LaneBits lanes, const Vec3<FloatPacket> &p);
 
+// Of an emitter that is a rectangle. Mitsuba's rectangle.cpp, sample_position.
+template <typename Real>
+Vec3<Real> point_on_rectangle(const Emitter &emitter, const Real &x, const Real &y) {
+    return Vec3<Real>(emitter.corner) + x * Vec3<Real>(emitter.edge_u) +
+           y * Vec3<Real>(emitter.edge_v);
+}
+
 // Whether the numbers x and y make a difference.
 bool needs_light_numbers(const PreparedScene &scene);
 

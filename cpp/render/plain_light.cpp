@@ -1,6 +1,7 @@
-// Shading of packets whose rays all meet one face of one colour, in scenes with few lights:
-// what most packets of most scenes are. The same light as in emitter_light.cpp, bit for bit;
+// Shading of packets whose rays all meet one face of one colour: what
+// most packets of most scenes are. The same light as in emitter_light.cpp, bit for bit;
 // what all lanes have in common is a number here, and nothing but the result is stored.
+#include "render/area_light.h"
 #include "render/emitter_sampling.h"
 #include "render/point_on_face.h"
 #include "render/tile.h"
@@ -13,17 +14,66 @@ struct PlainLight {
     Vec3<FloatPacket> weight, direction, target; // as of an EmitterSample
 };
 
-[[gnu::always_inline]] inline PlainLight from_few_points(const PreparedScene &scene,
-                                                         const EmitterChoices &choices,
-                                                         const Vec3<FloatPacket> &p) {
-    const auto light = lights_of(scene.few_points->lights, choices.emitter);
-    const PointLightSample<FloatPacket> point = sample_point_light(light, p);
-    const FloatPacket factor = point.factor * choices.weight;
+[[gnu::always_inline]] inline PlainLight from_points(const PointLight<FloatPacket> &light,
+                                                     const FloatPacket &choice_weight,
+                                                     const Vec3<FloatPacket> &p) {
+    const PointLightSample<FloatPacket> sample = sample_point_light(light, p);
+    const FloatPacket factor = sample.factor * choice_weight;
     return {by_axis([&](int k) {
-                return select(point.has_light, factor * light.intensity[k],
+                return select(sample.has_light, factor * light.intensity[k],
                               FloatPacket(0.0f));
             }),
-            point.direction, light.position};
+            sample.direction, light.position};
+}
+
+[[gnu::always_inline]] inline PlainLight
+from_rectangle(const Emitter &emitter, const EmitterTable &table,
+               const EmitterChoices &choices, const Vec3<FloatPacket> &p,
+               const FloatPacket &y) {
+    const Vec3<FloatPacket> point = point_on_rectangle(emitter, choices.x, y);
+    const AreaLightSample<FloatPacket> sample = sample_area_light(
+        point, in_all_lanes(table.normal), FloatPacket(table.inverse_area), p);
+    const FloatPacket factor = choices.weight / sample.density;
+    return {by_axis([&](int k) {
+                return select(sample.has_light, factor * emitter.radiance[k],
+                              FloatPacket(0.0f));
+            }),
+            sample.direction, point};
+}
+
+// Of one of the emitters of a scene without objects.
+[[gnu::always_inline]] inline PlainLight
+from_emitter(const PreparedScene &scene, uint32_t number, const EmitterChoices &choices,
+             const Vec3<FloatPacket> &p, const FloatPacket &y) {
+    const Emitter &emitter = scene.data.emitters[number];
+    const EmitterTable &table = scene.emitter_tables[number];
+    if (emitter.rectangle && emitter.radiance_texture == NONE && table.inverse_area > 0)
+        return from_rectangle(emitter, table, choices, p, y);
+    const EmitterSample<FloatPacket> light = sample_chosen(scene, number, choices, p, y);
+    return {light.weight, light.direction, light.target};
+}
+
+void set_lanes(PlainLight &light, LaneBits lanes, const PlainLight &other) {
+    const auto mask = from_bits<FloatPacket>(lanes);
+    for (int k = 0; k < 3; ++k) {
+        light.weight[k] = select(mask, other.weight[k], light.weight[k]);
+        light.direction[k] = select(mask, other.direction[k], light.direction[k]);
+        light.target[k] = select(mask, other.target[k], light.target[k]);
+    }
+}
+
+// Of the emitters that the given lanes chose.
+PlainLight from_chosen(const PreparedScene &scene, const EmitterChoices &choices,
+                       LaneBits lanes, const Vec3<FloatPacket> &p, const FloatPacket &y) {
+    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
+    PlainLight light = from_emitter(scene, first, choices, p, y);
+    for_each_value(choices.emitter,
+                   lanes & ~to_bits(choices.emitter == UIntPacket(first)),
+                   [&](uint32_t number, LaneBits holders) {
+                       set_lanes(light, holders,
+                                 from_emitter(scene, number, choices, p, y));
+                   });
+    return light;
 }
 
 } // namespace
@@ -31,8 +81,7 @@ struct PlainLight {
 bool TileRenderer::shades_plainly() const {
     return offset_ == ShadowOffset::mitsuba && bsdf_samples_ == 0 && !scene_.data.objects &&
            scene_.plane.has_common_origin() && target_.channels.depth < 0 &&
-           target_.channels.normal < 0 && !shadows_.empty() &&
-           (scene_.few_points || shadows_.size() == 1);
+           target_.channels.normal < 0 && !shadows_.empty();
 }
 
 // False if it is none: if there are several faces, or sides of one, or if the face glows or
@@ -80,7 +129,7 @@ void TileRenderer::shade_plain_packets() {
         packet.target = light.target;
         packet.start = offset_point(packet.p, in_all_lanes(packet.face_normal),
                                     light.target - packet.p);
-        const FloatPacket share = FloatPacket(factors_[0]) * cos_light;
+        const FloatPacket share = factors_of(packet.emitters, packet.lit) * cos_light;
         packet.number = reflected_.add(
             packet.first, (in_all_lanes(packet.colour) * share) * light.weight);
     };
@@ -90,13 +139,16 @@ void TileRenderer::shade_plain_packets() {
             if (scene_.few_points) {
                 const EmitterChoices choices = choose_few_points(scene_, x);
                 packet.emitters = choices.emitter;
-                reflect(packet, from_few_points(scene_, choices, packet.p));
+                reflect(packet,
+                        from_points(lights_of(scene_.few_points->lights, choices.emitter),
+                                    choices.weight, packet.p));
                 continue;
             }
-            const auto y = load<FloatPacket>(samples_.light_y(sample) + packet.first);
-            const EmitterSample<FloatPacket> light = sample_chosen(
-                scene_, 0, {UIntPacket(0u), FloatPacket(1.0f), x}, packet.p, y);
-            reflect(packet, {light.weight, light.direction, light.target});
+            const EmitterChoices choices = choose_emitters(scene_, x);
+            packet.emitters = choices.emitter;
+            reflect(packet, from_chosen(scene_, choices, packet.lanes, packet.p,
+                                        load<FloatPacket>(samples_.light_y(sample) +
+                                                          packet.first)));
         }
         for (const PlainPacket &packet : packets) {
             const auto append = [&](uint32_t emitter, LaneBits lit) {
