@@ -43,18 +43,17 @@ inline FloatPacket unit_floats(const UIntPacket &words) {
 // The lower half of each number's bits, and the upper one.
 inline UIntPacket low_words(const LongPacket &a) {
 #if defined(__AVX512F__)
-    const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24,
-                                           26, 28, 30);
-    return UIntPacket(
-        _mm512_permutex2var_epi32(drjit::low(a).m, even, drjit::high(a).m));
+    const __m512i even =
+        _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+    return UIntPacket(_mm512_permutex2var_epi32(drjit::low(a).m, even, drjit::high(a).m));
 #else
     return UIntPacket(a);
 #endif
 }
 inline UIntPacket high_words(const LongPacket &a) {
 #if defined(__AVX512F__)
-    const __m512i odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27,
-                                          29, 31);
+    const __m512i odd =
+        _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
     return UIntPacket(_mm512_permutex2var_epi32(drjit::low(a).m, odd, drjit::high(a).m));
 #else
     return UIntPacket(drjit::sr<32>(a));

@@ -97,7 +97,8 @@ template <typename Real>
 template <typename Real>
 AreaPoint<Real> sample_rectangle(const Emitter &emitter, const Shape &shape,
                                  const EmitterTable &table, const Real &x, const Real &y) {
-    return {point_on_rectangle(emitter, x, y), spread<Real>(table.normal), all_of<Real>(shape.first_face)};
+    return {point_on_rectangle(emitter, x, y), spread<Real>(table.normal),
+            all_of<Real>(shape.first_face)};
 }
 
 // A point of an analytic shape that glows, with its density by solid angle.
@@ -345,7 +346,8 @@ EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 LaneBits lanes,
                                                 const Vec3<FloatPacket> &p) {
     if (scene.few_points)
-        return from_point(lights_of(scene.few_points->lights, choices.emitter), choices.weight, p);
+        return from_point(lights_of(scene.few_points->lights, choices.emitter),
+                          choices.weight, p);
     const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
     PointLight<FloatPacket> lights = lights_in_all_lanes(scene.emitter_tables[first].point);
     const LaneBits others = lanes & ~to_bits(choices.emitter == UIntPacket(first));

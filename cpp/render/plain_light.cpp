@@ -26,10 +26,11 @@ struct PlainLight {
             sample.direction, light.position};
 }
 
-[[gnu::always_inline]] inline PlainLight
-from_rectangle(const Emitter &emitter, const EmitterTable &table,
-               const EmitterChoices &choices, const Vec3<FloatPacket> &p,
-               const FloatPacket &y) {
+[[gnu::always_inline]] inline PlainLight from_rectangle(const Emitter &emitter,
+                                                        const EmitterTable &table,
+                                                        const EmitterChoices &choices,
+                                                        const Vec3<FloatPacket> &p,
+                                                        const FloatPacket &y) {
     const Vec3<FloatPacket> point = point_on_rectangle(emitter, choices.x, y);
     const AreaLightSample<FloatPacket> sample = sample_area_light(
         point, in_all_lanes(table.normal), FloatPacket(table.inverse_area), p);
@@ -67,8 +68,7 @@ PlainLight from_chosen(const PreparedScene &scene, const EmitterChoices &choices
                        LaneBits lanes, const Vec3<FloatPacket> &p, const FloatPacket &y) {
     const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
     PlainLight light = from_emitter(scene, first, choices, p, y);
-    for_each_value(choices.emitter,
-                   lanes & ~to_bits(choices.emitter == UIntPacket(first)),
+    for_each_value(choices.emitter, lanes & ~to_bits(choices.emitter == UIntPacket(first)),
                    [&](uint32_t number, LaneBits holders) {
                        set_lanes(light, holders,
                                  from_emitter(scene, number, choices, p, y));
@@ -130,8 +130,8 @@ void TileRenderer::shade_plain_packets() {
         packet.start = offset_point(packet.p, in_all_lanes(packet.face_normal),
                                     light.target - packet.p);
         const FloatPacket share = factors_of(packet.emitters, packet.lit) * cos_light;
-        packet.number = reflected_.add(
-            packet.first, (in_all_lanes(packet.colour) * share) * light.weight);
+        packet.number = reflected_.add(packet.first, (in_all_lanes(packet.colour) * share) *
+                                                         light.weight);
     };
     for (uint32_t sample = 0; sample < emitter_samples_; ++sample) {
         for (PlainPacket &packet : packets) {

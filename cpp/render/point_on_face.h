@@ -65,8 +65,8 @@ Vec3<Real> interpolated_normal(const Vec2<Real> &at, const Corners<Part> &n,
 // the face normal serves; there need be none if it does everywhere.
 template <typename Real, typename Part>
 [[gnu::always_inline]] inline SurfacePoint<Real>
-point_at(const Vec2<Real> &at, const Corners<Part> &corners,
-                            const Vec3<Part> &face_normal, const Corners<Part> *normals) {
+point_at(const Vec2<Real> &at, const Corners<Part> &corners, const Vec3<Part> &face_normal,
+         const Corners<Part> *normals) {
     const Vec3<Real> normal(face_normal);
     return {interpolate(corners, Real(1.0f) - at.x - at.y, at.x, at.y), normal,
             normals ? interpolated_normal(at, *normals, face_normal) : normal};

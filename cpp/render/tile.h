@@ -95,12 +95,12 @@ struct ShadedPacket {
 
 // The same of rays that all meet one side of one face, which is of one colour.
 struct PlainPacket {
-    size_t first; // ray in lane 0
+    size_t first;   // ray in lane 0
     LaneBits lanes; // that reflect light
-    bool front; // whether they see the front
+    bool front;     // whether they see the front
     Vec3f colour, face_normal;
     Vec3<FloatPacket> p, shading_normal;
-    UIntPacket emitters; // that are chosen
+    UIntPacket emitters;             // that are chosen
     Vec3<FloatPacket> start, target; // of shadow rays
     LaneBits lit;
     uint32_t number; // of reflected light
