@@ -266,9 +266,10 @@ nb::dict robust_segment_of(const SceneHandle &handle, const Floats3 &origin,
 
 void bind_render_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("render_selftest", "Parts of the renderer, for tests.");
-    s.def("packet_streams", &packet_streams, nb::arg("seeds"), nb::arg("indices"),
-          nb::arg("drawn"),
-          "Numbers of sixteen streams; drawn: 2 or 1 at a time, 0 for one that is dropped.");
+    s.def(
+        "packet_streams", &packet_streams, nb::arg("seeds"), nb::arg("indices"),
+        nb::arg("drawn"),
+        "Numbers of sixteen streams; drawn: 2 or 1 at a time, 0 for one that is dropped.");
     s.def("sampler_stream", &sampler_stream, nb::arg("seed"), nb::arg("pixel_count"),
           nb::arg("samples"), nb::arg("pixel"), nb::arg("sample"), nb::arg("dimensions"));
     s.def("spread_sample", &spread_sample, nb::arg("sampler"), nb::arg("seed"),
