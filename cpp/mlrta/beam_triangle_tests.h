@@ -54,11 +54,10 @@ private:
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
-    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
-                uint32_t primitive);
-    void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+    void decide(uint32_t packet, LaneBits lanes, LaneBits certain_hits, uint32_t primitive);
+    void decide_parallel(uint32_t packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
-    void update_least(uint64_t packets);
+    void update_least(const BeamPackets::Packets &packets);
     void update_least();
 
     const KdTree &tree_;
