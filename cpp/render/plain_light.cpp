@@ -1,6 +1,6 @@
 // Shading of packets whose rays all meet one face of one colour, as most do in most scenes,
-// with Mitsuba's offset of shadow rays. The same light as in emitter_light.cpp, bit for bit;
-// what all lanes have in common is found once. Steps are short, as in shade_hits().
+// with Mitsuba's offset of shadow rays. The same light as in emitter_light.cpp, bit for
+// bit; what all lanes have in common is found once. Steps are short, as in shade_hits().
 #include "render/area_light.h"
 #include "render/emitter_sampling.h"
 #include "render/point_on_face.h"
@@ -89,8 +89,8 @@ bool TileRenderer::shades_plainly() const {
            target_.channels.normal < 0 && !shadows_.empty();
 }
 
-// Keeps the packet to be shaded if it is plain. False if there are several faces, or sides of one, or if the face glows or
-// has a texture.
+// Keeps the packet to be shaded if it is plain. False if there are several faces, or sides
+// of one, or if the face glows or has a texture.
 bool TileRenderer::find_plain_packet(size_t first, const UIntPacket &faces, LaneBits hits) {
     const uint32_t number = primitive_[first + uint32_t(__builtin_ctz(hits))];
     if ((hits & ~to_bits(faces == UIntPacket(number))) != 0)
