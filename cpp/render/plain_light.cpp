@@ -50,6 +50,8 @@ from_emitter(const PreparedScene &scene, uint32_t number, const EmitterChoices &
     const EmitterTable &table = scene.emitter_tables[number];
     if (emitter.rectangle && emitter.radiance_texture == NONE && table.inverse_area > 0)
         return from_rectangle(emitter, table, choices, p, y);
+    if (emitter.type == EmitterType::point || emitter.type == EmitterType::spot)
+        return from_points(lights_in_all_lanes(table.point), choices.weight, p);
     const EmitterSample<FloatPacket> light = sample_chosen(scene, number, choices, p, y);
     return {light.weight, light.direction, light.target};
 }
