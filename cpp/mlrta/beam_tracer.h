@@ -171,7 +171,7 @@ private:
     }
 
     FloatPacket distances_of(const BeamPacket &packet) {
-        if constexpr (EXACT)
+        if constexpr (EXACT_DISTANCES)
             return memory_.distances.of(rays_, packet.first_ray, packet.found,
                                         packet.primitive, counters_);
         // Reciprocal depths are all that single precision needs.

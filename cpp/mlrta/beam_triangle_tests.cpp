@@ -177,9 +177,9 @@ void BeamTriangleTests<query>::cover(uint32_t number,
                                    forms.constant[DEPTH][lane],
                                    forms.of_u[DEPTH][lane],
                                    forms.of_v[DEPTH][lane],
-                                   EXACT ? forms.depth_shrink[lane] : 1.0f,
-                                   EXACT ? forms.depth_grow[lane] : 1.0f,
-                                   EXACT ? forms.depth_error[lane] : 0.0f};
+                                   EXACT_DISTANCES ? forms.depth_shrink[lane] : 1.0f,
+                                   EXACT_DISTANCES ? forms.depth_grow[lane] : 1.0f,
+                                   EXACT_DISTANCES ? forms.depth_error[lane] : 0.0f};
     for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
@@ -197,9 +197,10 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
     const FloatPacket error(forms.depth_error[lane]);
     const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
     const FloatPacket highest =
-        EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
+        EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
     const FloatPacket lowest =
-        EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
+        EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error)
+                        : depth;
     const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
     auto possible = (highest >= packet.least) & (smallest >= -edge_error);
     FloatPacket begin(beam_.nearest);

@@ -88,7 +88,7 @@ const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
 template <typename Value>
 HitDistances::Rounded HitDistances::rounded(const Vec3<FloatPacket> &d,
                                             const Planes<Value> &planes) {
-    if constexpr (!EXACT) {
+    if constexpr (!EXACT_DISTANCES) {
         const auto of = [&](int k) { return FloatPacket(planes.normal[k]); };
         return {1.0f / fused(d.x, of(0), fused(d.y, of(1), d.z * of(2))), ALL_LANES};
     }

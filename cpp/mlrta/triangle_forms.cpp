@@ -162,10 +162,10 @@ MaskOf<Real> TriangleForms::may_hit(const Bounds &bounds, const Real &least,
     };
     const Real edges = minimum(greatest(0), minimum(greatest(1), greatest(2)));
     const Real depth = greatest(DEPTH);
-    if constexpr (!EXACT)
-        return touched & (edges >= 0.0f) & (depth >= least);
-    const Real highest = fused(depth, value_of(depth_grow), value_of(depth_error));
-    return touched & (edges >= -value_of(edge_error)) & (highest >= least);
+    const Real highest =
+        EXACT_DISTANCES ? fused(depth, value_of(depth_grow), value_of(depth_error)) : depth;
+    const Real edge_bound = EXACT ? -value_of(edge_error) : Real(0.0f);
+    return touched & (edges >= edge_bound) & (highest >= least);
 }
 
 LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) const {
@@ -190,7 +190,7 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
     const FormRange<FloatPacket> depth = range_of<FloatPacket>(DEPTH, run, value_of);
     packets.least = depth.least();
     packets.greatest = depth.greatest();
-    if constexpr (EXACT) {
+    if constexpr (EXACT_DISTANCES) {
         const FloatPacket error = value_of(depth_error);
         packets.least = fused(packets.least, value_of(depth_shrink), -error);
         packets.greatest = fused(packets.greatest, value_of(depth_grow), error);
