@@ -111,6 +111,9 @@ private:
             for (uint32_t n = 0; n < beam.count; ++n)
                 cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
         counters_.fallbacks += !done;
+        if constexpr (Output::query == Query::closest && EXACT_DISTANCES)
+            if (done && output_.wants_distances())
+                memory_.distances.prepare({memory_.hit.data(), memory_.hit_count});
         for (uint32_t n = 0; n < beam.count; ++n)
             finish(n, done, frontier);
         if (beam.any_stray)

@@ -109,6 +109,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         run_pairs += uint32_t(std::popcount(triangles));
     }
     bool any_covered = false;
+    LaneBits hit = 0;
     uint32_t pairs = 0;
     uint64_t in_pairs = 0; // packets
     for (uint32_t i = 0; i < run_pairs; ++i) {
@@ -126,6 +127,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
             if (coverage.covered != 0) {
                 cover(n, coverage, forms, lane, numbers[lane]);
                 any_covered = true;
+                hit |= LaneBits(1) << lane;
             }
         }
         store_compressed(pairs_.data() + pairs, lane_indices() + UIntPacket(first),
@@ -136,7 +138,6 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     if constexpr (query == Query::closest)
         beam_.settle(rays_, in_pairs);
     uint64_t changed = 0;
-    LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
                        lane = pairs_[i] / BeamPackets::CAPACITY;
@@ -144,11 +145,10 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         changed |= uint64_t(found) << n;
         hit |= found << lane;
     }
-    if constexpr (query == Query::any)
-        for_each_lane(hit, [&](uint32_t lane) {
-            if (hit_count_ < hit_.size())
-                hit_[hit_count_++] = numbers[lane];
-        });
+    for_each_lane(hit, [&](uint32_t lane) {
+        if (hit_count_ < hit_.size())
+            hit_[hit_count_++] = numbers[lane];
+    });
     if (changed != 0)
         update_least(changed);
     else if (any_covered)
@@ -195,7 +195,7 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
     };
     const FloatPacket depth = value(TriangleForms::DEPTH);
     const FloatPacket error(forms.depth_error[lane]);
-    const FloatPacket edge_error(EXACT ? forms.edge_error[lane] : 0.0f);
+    const FloatPacket edge_error(EXACT ? forms.ray_error[lane] : 0.0f);
     const FloatPacket highest =
         EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
     const FloatPacket lowest =
@@ -209,34 +209,44 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
         possible &= lowest <= beam_.begins[number].greatest;
     }
     const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
-    const auto nearer = possible & certain & (lowest > packet.greatest) & (highest < begin);
-    const LaneBits found = to_bits(nearer);
-    packet.found |= found;
-    if constexpr (query == Query::any) {
-        packet.least = select(nearer, FloatPacket(INFINITE), packet.least);
-    } else {
-        packet.least = select(nearer, lowest, packet.least);
-        packet.greatest = select(nearer, highest, packet.greatest);
-        packet.primitive =
-            select(MaskOf<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
-    }
+    const auto nearer = (lowest > packet.greatest) & (highest < begin);
+    const LaneBits found = to_bits(possible & certain & nearer);
+    take(packet, found, lowest, highest, primitive);
     const LaneBits open = EXACT ? to_bits(possible) & ~found : 0;
     if (open != 0) [[unlikely]]
-        decide(packet, open, to_bits(certain), primitive);
+        decide(packet, open, {to_bits(certain), to_bits(nearer), lowest, highest},
+               primitive);
     return (found | open) != 0;
+}
+
+// Hits of a triangle at depths that have these bounds.
+template <Query query>
+void BeamTriangleTests<query>::take(BeamPacket &packet, LaneBits lanes,
+                                    const FloatPacket &lowest, const FloatPacket &highest,
+                                    uint32_t primitive) {
+    packet.found |= lanes;
+    const auto mask = from_bits<FloatPacket>(lanes);
+    if constexpr (query == Query::any) {
+        packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+    } else {
+        packet.least = select(mask, lowest, packet.least);
+        packet.greatest = select(mask, highest, packet.greatest);
+        packet.primitive =
+            select(MaskOf<UIntPacket>(mask), UIntPacket(primitive), packet.primitive);
+    }
 }
 
 // By the contract of geometry/triangle_test.h.
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
-                                      LaneBits certain_hits, uint32_t primitive) {
+                                      const Known &known, uint32_t primitive) {
     if (query == Query::any && beam_.parallel) {
-        decide_parallel(packet, lanes, certain_hits, primitive);
+        decide_parallel(packet, lanes, known.hit, primitive);
         return;
     }
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
-    for_each_value(packet.primitive, lanes & packet.found,
+    for_each_value(packet.primitive, lanes & packet.found & ~known.nearer,
                    [&](uint32_t rival, LaneBits holders) {
                        if (rival != primitive && !in_one_plane(tree_.triangles[rival],
                                                                tree_.triangles[primitive]))
@@ -247,14 +257,16 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                            lanes &= ~holders;
                    });
     counters_.double_tests += uint64_t(std::popcount(lanes));
-    LaneBits hits = lanes & certain_hits;
-    for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
+    LaneBits hits = lanes & known.hit;
+    for_each_lane(lanes & ~known.hit, [&](uint32_t lane) {
         const HitDecision decision =
             decide_hit(beam_.origin, direction_of(rays_, packet.first_ray + lane),
                        tree_.triangles[primitive]);
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
+    take(packet, hits & known.nearer, known.lowest, known.highest, primitive);
+    hits &= ~known.nearer;
     const UIntPacket number(primitive);
     tied &= hits;
     packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
@@ -279,11 +291,8 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
     if (hits == 0)
         return;
 
-    packet.found |= hits;
-    const auto mask = from_bits<FloatPacket>(hits);
-    packet.primitive = select(from_bits<UIntPacket>(hits), number, packet.primitive);
     if constexpr (query == Query::any) {
-        packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+        take(packet, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
         return;
     }
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
@@ -292,11 +301,9 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
         load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
-    packet.least =
-        select(mask, minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
-               packet.least);
-    packet.greatest =
-        select(mask, FloatPacket((1 + 0x1p-21) / (distance * main)), packet.greatest);
+    take(packet, hits,
+         minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
+         FloatPacket((1 + 0x1p-21) / (distance * main)), primitive);
 }
 
 // The same for rays that each have an origin, of Query::any.
@@ -329,7 +336,7 @@ void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
     beam_.settle(rays_, ~uint64_t(0));
     for (uint32_t n = 0; n < beam_.count; ++n) {
         BeamPacket &packet = beam_.packets[n];
-        decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, primitive);
+        decide(packet, packet.active & to_bits(packet.least < INFINITE), {}, primitive);
     }
     counters_.triangle_tests += beam_.count;
     update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));

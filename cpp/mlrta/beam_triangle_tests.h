@@ -44,7 +44,10 @@ public:
     bool all_done() const { return least_ == INFINITY; }
     // Whether the beam has been tested against all the triangles that it may be.
     bool spent() const { return triangles_left_ == 0; }
-    // Triangles that rays were found to hit, at most WIDE_WIDTH of them.
+    // Triangles that rays were found to hit, MOST_HIT of them at most: of Query::closest
+    // those that were the nearest for some time.
+    static constexpr uint32_t MOST_HIT =
+        query == Query::any ? WIDE_WIDTH : HitDistances::MOST_PREPARED;
     std::span<const uint32_t> hit() const { return {hit_.data(), hit_count_}; }
 
 private:
@@ -54,8 +57,15 @@ private:
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
-    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
-                uint32_t primitive);
+    // Of a triangle, lanes that hit it for certain if it is ahead, lanes that have found
+    // nothing as near if they hit it, and bounds of the reciprocal depths of these.
+    struct Known {
+        LaneBits hit = 0, nearer = 0;
+        FloatPacket lowest = 0.0f, highest = 0.0f;
+    };
+    void decide(BeamPacket &packet, LaneBits lanes, const Known &known, uint32_t primitive);
+    void take(BeamPacket &packet, LaneBits lanes, const FloatPacket &lowest,
+              const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
     void update_least(uint64_t packets);
@@ -77,7 +87,7 @@ private:
     std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
-    std::array<uint32_t, WIDE_WIDTH> hit_;
+    std::array<uint32_t, MOST_HIT> hit_;
     uint32_t hit_count_ = 0;
     float least_ = 0; // of all rays
     float far_end_ = 0;

@@ -109,6 +109,7 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
+    store(ray_error, edge_bound);
 
     // Where the vertices lie in the rectangle: two roundings and what double precision
     // leaves, a difference, two products and a sum, and the middle and extent of all.

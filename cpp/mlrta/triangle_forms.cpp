@@ -26,9 +26,9 @@ constexpr float UNDERFLOW = 0x1p-146f;
 // difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
 // have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
 // a rectangle two roundings lead to the form's value at the center, three to its change
-// along a side, and five to the sum of all: 16 in a row. That is 32 s e S; 40 covers
-// products of roundings and the bound itself.
-constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
+// along a side, and five to the sum of all: 16 in a row. That is 32 s e S, and 20 s e S for
+// a ray; 40 and 21 cover products of roundings and the bound itself.
+constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF, RAY_ROUNDINGS = 21 * FLOAT_ROUNDOFF;
 // Depth: N comes from double precision, where thin triangles keep its digits. With n its
 // largest component, 12 roundings of at most n S are left, and that of the bound.
 constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
@@ -78,7 +78,7 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
 
     const Real inverse = 1.0f / volume;
     safe &= absolute(volume) > SMALLEST_VOLUME;
-    Real share, edge_bound, depth_bound;
+    Real share, edge_bound, ray_bound, depth_bound;
     if constexpr (EXACT) {
         const Real edge = maximum(largest_component(ab),
                                   maximum(largest_component(bc), largest_component(ca)));
@@ -88,11 +88,12 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         share = volume_error * inverse_size;
         safe &= share <= LARGEST_SHARE;
         edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
+        ray_bound = (RAY_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
         depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
                       sum * inverse_size;
         unsafe = given & ~to_bits(safe);
     } else {
-        share = edge_bound = depth_bound = Real(0.0f);
+        share = edge_bound = ray_bound = depth_bound = Real(0.0f);
         unsafe = 0;
     }
     const LaneBits safe_bits = to_bits(safe) & given;
@@ -100,6 +101,7 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
+    store(ray_error, ray_bound);
 
     // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
     // two products and a sum follow, and the middle and extent of all: less than 16 of at
