@@ -178,19 +178,30 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
                                                        const UIntPacket &primitives,
                                                        Counters &counters) {
     Planes<FloatPacket> planes;
-    for_each_value(primitives, lanes, [&](uint32_t primitive, LaneBits holders) {
+    const auto put = [&](uint32_t primitive, LaneBits holders) {
         const Plane &plane = plane_of(primitive);
         const auto mask = from_bits<FloatPacket>(holders);
-        const auto put = [&](FloatPacket &values, float value) {
+        const auto put_value = [&](FloatPacket &values, float value) {
             values = select(mask, FloatPacket(value), values);
         };
         for (int k = 0; k < 3; ++k) {
-            put(planes.normal[k], plane.normal[k]);
-            put(planes.rest[k], plane.rest[k]);
+            put_value(planes.normal[k], plane.normal[k]);
+            put_value(planes.rest[k], plane.rest[k]);
         }
-        put(planes.anchor, plane.anchor);
-        put(planes.error, plane.error);
-    });
+        put_value(planes.anchor, plane.anchor);
+        put_value(planes.error, plane.error);
+    };
+    // From both ends, since there are few triangles, and one takes long to be told from the
+    // next.
+    for (LaneBits left = lanes; left != 0;) {
+        const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
+        const uint32_t other = lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
+        const LaneBits of_one = to_bits(primitives == UIntPacket(one));
+        const LaneBits of_other = to_bits(primitives == UIntPacket(other));
+        put(one, of_one);
+        put(other, of_other);
+        left &= ~(of_one | of_other);
+    }
     const Rounded distances = rounded(directions_of(rays, first_ray), planes);
     const LaneBits open = lanes & ~distances.certain;
     if (open == 0)

@@ -23,8 +23,8 @@ public:
         known_.fill(NO_PRIMITIVE);
     }
 
-    // Makes planes of triangles that of() is likely to be asked for. More of them than these
-    // would leave each other no room.
+    // Makes planes of triangles that of() is likely to be asked for. More of them than
+    // these would leave each other no room.
     static constexpr uint32_t MOST_PREPARED = 256;
     void prepare(std::span<const uint32_t> primitives);
 
