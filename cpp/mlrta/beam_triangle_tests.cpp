@@ -183,11 +183,12 @@ void BeamTriangleTests<query>::cover(uint32_t number,
     for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
-// One triangle against sixteen rays. Returns whether they found something.
+// A triangle as sixteen rays see it.
 template <Query query>
-bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
-                                           uint32_t lane, uint32_t primitive) {
-    BeamPacket &packet = beam_.packets[number];
+BeamTriangleTests<query>::Seen BeamTriangleTests<query>::see(uint32_t number,
+                                                             const TriangleForms &forms,
+                                                             uint32_t lane) const {
+    const BeamPacket &packet = beam_.packets[number];
     const auto value = [&](int form) {
         return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
                      fused(packet.v, FloatPacket(forms.of_v[form][lane]),
@@ -196,27 +197,47 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
     const FloatPacket depth = value(TriangleForms::DEPTH);
     const FloatPacket error(forms.depth_error[lane]);
     const FloatPacket edge_error(EXACT ? forms.ray_error[lane] : 0.0f);
-    const FloatPacket highest =
+    Seen seen;
+    seen.highest =
         EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
-    const FloatPacket lowest =
-        EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error)
-                        : depth;
+    seen.lowest = EXACT_DISTANCES
+                      ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error)
+                      : depth;
     const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-    auto possible = (highest >= packet.least) & (smallest >= -edge_error);
+    seen.possible = (seen.highest >= packet.least) & (smallest >= -edge_error);
     FloatPacket begin(beam_.nearest);
     if (query == Query::any && beam_.parallel) {
         begin = beam_.begins[number].least;
-        possible &= lowest <= beam_.begins[number].greatest;
+        seen.possible &= seen.lowest <= beam_.begins[number].greatest;
     }
-    const auto certain = EXACT ? smallest > edge_error : smallest >= edge_error;
-    const auto nearer = (lowest > packet.greatest) & (highest < begin);
-    const LaneBits found = to_bits(possible & certain & nearer);
-    take(packet, found, lowest, highest, primitive);
-    const LaneBits open = EXACT ? to_bits(possible) & ~found : 0;
+    seen.certain = EXACT ? smallest > edge_error : smallest >= edge_error;
+    seen.nearer = (seen.lowest > packet.greatest) & (seen.highest < begin);
+    return seen;
+}
+
+// One triangle against sixteen rays. Returns whether they found something. Without a frame
+// of the stack, since what is seldom needed is called at the end.
+template <Query query>
+bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
+                                           uint32_t lane, uint32_t primitive) {
+    const Seen seen = see(number, forms, lane);
+    const LaneBits found = to_bits(seen.possible & seen.certain & seen.nearer);
+    take(beam_.packets[number], found, seen.lowest, seen.highest, primitive);
+    const LaneBits open = EXACT ? to_bits(seen.possible) & ~found : 0;
     if (open != 0) [[unlikely]]
-        decide(packet, open, {to_bits(certain), to_bits(nearer), lowest, highest},
-               primitive);
-    return (found | open) != 0;
+        return decide_open(number, forms, lane, primitive, open);
+    return found != 0;
+}
+
+// Rays of which test_packet() leaves it open whether they find something.
+template <Query query>
+[[gnu::noinline]] bool
+BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &forms,
+                                      uint32_t lane, uint32_t primitive, LaneBits open) {
+    const Seen seen = see(number, forms, lane);
+    decide(beam_.packets[number], open, to_bits(seen.certain), to_bits(seen.nearer), seen,
+           primitive);
+    return true;
 }
 
 // Hits of a triangle at depths that have these bounds.
@@ -239,14 +260,15 @@ void BeamTriangleTests<query>::take(BeamPacket &packet, LaneBits lanes,
 // By the contract of geometry/triangle_test.h.
 template <Query query>
 void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
-                                      const Known &known, uint32_t primitive) {
+                                      LaneBits certain_hits, LaneBits certainly_nearer,
+                                      const Seen &seen, uint32_t primitive) {
     if (query == Query::any && beam_.parallel) {
-        decide_parallel(packet, lanes, known.hit, primitive);
+        decide_parallel(packet, lanes, certain_hits, primitive);
         return;
     }
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
-    for_each_value(packet.primitive, lanes & packet.found & ~known.nearer,
+    for_each_value(packet.primitive, lanes & packet.found & ~certainly_nearer,
                    [&](uint32_t rival, LaneBits holders) {
                        if (rival != primitive && !in_one_plane(tree_.triangles[rival],
                                                                tree_.triangles[primitive]))
@@ -257,16 +279,16 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
                            lanes &= ~holders;
                    });
     counters_.double_tests += uint64_t(std::popcount(lanes));
-    LaneBits hits = lanes & known.hit;
-    for_each_lane(lanes & ~known.hit, [&](uint32_t lane) {
+    LaneBits hits = lanes & certain_hits;
+    for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
         const HitDecision decision =
             decide_hit(beam_.origin, direction_of(rays_, packet.first_ray + lane),
                        tree_.triangles[primitive]);
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
-    take(packet, hits & known.nearer, known.lowest, known.highest, primitive);
-    hits &= ~known.nearer;
+    take(packet, hits & certainly_nearer, seen.lowest, seen.highest, primitive);
+    hits &= ~certainly_nearer;
     const UIntPacket number(primitive);
     tied &= hits;
     packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
@@ -336,7 +358,8 @@ void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
     beam_.settle(rays_, ~uint64_t(0));
     for (uint32_t n = 0; n < beam_.count; ++n) {
         BeamPacket &packet = beam_.packets[n];
-        decide(packet, packet.active & to_bits(packet.least < INFINITE), {}, primitive);
+        decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, 0, {},
+               primitive);
     }
     counters_.triangle_tests += beam_.count;
     update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));

@@ -57,13 +57,17 @@ private:
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive);
     void test_unsafe(uint32_t primitive);
-    // Of a triangle, lanes that hit it for certain if it is ahead, lanes that have found
-    // nothing as near if they hit it, and bounds of the reciprocal depths of these.
-    struct Known {
-        LaneBits hit = 0, nearer = 0;
-        FloatPacket lowest = 0.0f, highest = 0.0f;
+    // Rays that may hit a triangle nearer than all else; of those the ones that hit it for
+    // certain if it is ahead, and the ones that have found nothing as near if they hit it.
+    struct Seen {
+        MaskOf<FloatPacket> possible, certain, nearer;
+        FloatPacket lowest = 0.0f, highest = 0.0f; // bounds of its reciprocal depths
     };
-    void decide(BeamPacket &packet, LaneBits lanes, const Known &known, uint32_t primitive);
+    Seen see(uint32_t packet, const TriangleForms &forms, uint32_t lane) const;
+    bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
+                     uint32_t primitive, LaneBits open);
+    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+                LaneBits certainly_nearer, const Seen &seen, uint32_t primitive);
     void take(BeamPacket &packet, LaneBits lanes, const FloatPacket &lowest,
               const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
