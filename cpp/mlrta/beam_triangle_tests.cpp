@@ -1,6 +1,7 @@
 #include "mlrta/beam_triangle_tests.h"
 
 #include "base/exactness.h"
+#include "geometry/coplanar.h"
 #include "geometry/triangle_test.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
@@ -20,18 +21,6 @@ constexpr uint32_t DENSE_TRIANGLES = 200;
 
 Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
-}
-
-// Whether two triangles, if both have an area, certainly lie in one plane: one across an
-// axis, or that of the same three vertices. Surfaces that were modelled twice do.
-bool in_one_plane(const Triangle &one, const Triangle &other) {
-    for (int k = 0; k < 3; ++k) {
-        const float at = one.a[k];
-        if (one.b[k] == at && one.c[k] == at)
-            return other.a[k] == at && other.b[k] == at && other.c[k] == at;
-    }
-    const auto is_of_one = [&](Vec3f v) { return v == one.a || v == one.b || v == one.c; };
-    return is_of_one(other.a) && is_of_one(other.b) && is_of_one(other.c);
 }
 
 } // namespace
@@ -234,9 +223,7 @@ template <Query query>
 [[gnu::noinline]] bool
 BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &forms,
                                       uint32_t lane, uint32_t primitive, LaneBits open) {
-    const Seen seen = see(number, forms, lane);
-    decide(beam_.packets[number], open, to_bits(seen.certain), to_bits(seen.nearer), seen,
-           primitive);
+    decide(beam_.packets[number], open, see(number, forms, lane), primitive);
     return true;
 }
 
@@ -257,11 +244,13 @@ void BeamTriangleTests<query>::take(BeamPacket &packet, LaneBits lanes,
     }
 }
 
-// By the contract of geometry/triangle_test.h.
+// By the contract of geometry/triangle_test.h. Where a depth certainly is the nearest, only
+// whether the ray hits is decided.
 template <Query query>
-void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes,
-                                      LaneBits certain_hits, LaneBits certainly_nearer,
-                                      const Seen &seen, uint32_t primitive) {
+void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes, const Seen &seen,
+                                      uint32_t primitive) {
+    const LaneBits certain_hits = to_bits(seen.certain);
+    const LaneBits certainly_nearer = to_bits(seen.nearer);
     if (query == Query::any && beam_.parallel) {
         decide_parallel(packet, lanes, certain_hits, primitive);
         return;
@@ -358,8 +347,7 @@ void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
     beam_.settle(rays_, ~uint64_t(0));
     for (uint32_t n = 0; n < beam_.count; ++n) {
         BeamPacket &packet = beam_.packets[n];
-        decide(packet, packet.active & to_bits(packet.least < INFINITE), 0, 0, {},
-               primitive);
+        decide(packet, packet.active & to_bits(packet.least < INFINITE), {}, primitive);
     }
     counters_.triangle_tests += beam_.count;
     update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));

@@ -60,14 +60,13 @@ private:
     // Rays that may hit a triangle nearer than all else; of those the ones that hit it for
     // certain if it is ahead, and the ones that have found nothing as near if they hit it.
     struct Seen {
-        MaskOf<FloatPacket> possible, certain, nearer;
+        MaskOf<FloatPacket> possible = false, certain = false, nearer = false;
         FloatPacket lowest = 0.0f, highest = 0.0f; // bounds of its reciprocal depths
     };
     Seen see(uint32_t packet, const TriangleForms &forms, uint32_t lane) const;
     bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive, LaneBits open);
-    void decide(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
-                LaneBits certainly_nearer, const Seen &seen, uint32_t primitive);
+    void decide(BeamPacket &packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
     void take(BeamPacket &packet, LaneBits lanes, const FloatPacket &lowest,
               const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
