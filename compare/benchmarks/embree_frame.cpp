@@ -15,7 +15,8 @@ struct Buffers {
     typename Mode::Shadow shadow;
     std::vector<FloatPacket> cosine;
 
-    static Buffers &of_thread() {
+    // Not inlined: their address is found once a share, not once a packet.
+    [[gnu::noinline]] static Buffers &of_thread() {
         static thread_local Buffers buffers;
         return buffers;
     }

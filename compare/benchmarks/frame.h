@@ -6,6 +6,7 @@
 // nothing but tracing.
 #pragma once
 
+#include "base/morton.h"
 #include "base/parallel.h"
 #include "base/reciprocal_estimate.h"
 #include "base/simd.h"
@@ -13,7 +14,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
 
 namespace mlrt::bench {
 
@@ -95,8 +95,9 @@ struct LaneCentres {
 inline constexpr LaneCentres LANE_CENTRES;
 
 inline Block block_of(const RayTile &tile, uint32_t index, const View &view) {
-    Block block{tile.x + BLOCK_SIDE * even_bits(index),
-                tile.y + BLOCK_SIDE * even_bits(index >> 1), ALL_LANES};
+    const MortonPoint place = of_morton_code(index);
+    Block block{tile.x + BLOCK_SIDE * place.column, tile.y + BLOCK_SIDE * place.row,
+                ALL_LANES};
     if (block.x + BLOCK_SIDE > view.columns() || block.y + BLOCK_SIDE > view.rows()) {
         block.on_film = 0;
         for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
@@ -141,27 +142,36 @@ struct Shading {
 // `normal` need not have unit length; `t` is finite in all lanes.
 inline Shading shade(const View &view, const Vec3<FloatPacket> &direction,
                      const FloatPacket &t, const Vec3<FloatPacket> &normal) {
+    const auto product = [](const Vec3<FloatPacket> &a, const Vec3<FloatPacket> &b) {
+        return fused(a.x, b.x, fused(a.y, b.y, a.z * b.z));
+    };
+    const Vec3f offset = view.camera.origin - view.light;
     Shading result;
     result.from_light =
-        (in_all_lanes(view.camera.origin) + t * direction) - in_all_lanes(view.light);
-    result.cosine = absolute(dot(normal, result.from_light)) *
-                    reciprocal_root_estimate(dot(normal, normal) *
-                                             dot(result.from_light, result.from_light));
+        by_axis([&](int k) { return fused(t, direction[k], FloatPacket(offset[k])); });
+    result.cosine = absolute(product(normal, result.from_light)) *
+                    reciprocal_root_estimate(product(normal, normal) *
+                                             product(result.from_light, result.from_light));
     return result;
 }
 
 // Writes a value a ray to a grid of rays.
 template <typename Value, typename Packet>
 void write_rays(const View &view, const Block &block, const Packet &packet, Value *values) {
-    const LaneArray<Value> lanes = to_lanes<Value>(packet);
     Value *corner = values + size_t(block.y) * view.columns() + block.x;
     if (block.on_film == ALL_LANES) {
-        // Neighbours along x are neighbours in Morton order.
-        for (uint32_t lane = 0; lane < PACKET_WIDTH; lane += 2)
-            std::memcpy(corner + size_t(lane_y(lane)) * view.columns() + lane_x(lane),
-                        &lanes[lane], 2 * sizeof(Value));
+        // From Morton order to row by row.
+        const auto rows =
+            drjit::shuffle<0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15>(packet);
+        const size_t columns = view.columns();
+        const auto first = drjit::low(rows), last = drjit::high(rows);
+        store(corner, drjit::low(first));
+        store(corner + columns, drjit::high(first));
+        store(corner + 2 * columns, drjit::low(last));
+        store(corner + 3 * columns, drjit::high(last));
         return;
     }
+    const LaneArray<Value> lanes = to_lanes<Value>(packet);
     for_each_lane(block.on_film, [&](uint32_t lane) {
         corner[size_t(lane_y(lane)) * view.columns() + lane_x(lane)] = lanes[lane];
     });

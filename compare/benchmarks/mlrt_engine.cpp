@@ -41,37 +41,54 @@ struct TileRays {
     }
 };
 
-TileRays &rays_of_thread() {
+// Not inlined: its address is found once a share, not once a packet.
+[[gnu::noinline]] TileRays &rays_of_thread() {
     static thread_local TileRays rays;
     return rays;
 }
 
-// Normals of the triangles that rays hit, of any length, in the given lanes.
-Vec3<FloatPacket> normals(const KdTree &tree, const uint32_t *primitives, LaneBits lanes) {
-    // Mostly one triangle covers a packet.
-    const uint32_t first = primitives[std::countr_zero(lanes)];
-    const auto hit = load<UIntPacket>(primitives);
-    if (to_bits(hit == first) == lanes) {
-        const Triangle &triangle = tree.triangles[first];
-        return in_all_lanes(cross(triangle.b - triangle.a, triangle.c - triangle.a));
+// Normals of the triangles that rays hit, of any length.
+class Normals {
+public:
+    explicit Normals(const KdTree &tree) : tree_(tree) {}
+
+    // In the given lanes, one or more.
+    Vec3<FloatPacket> operator()(const uint32_t *primitives, LaneBits lanes) {
+        // Mostly one triangle covers a packet, and the next one too.
+        const uint32_t first = primitives[std::countr_zero(lanes)];
+        const auto hit = load<UIntPacket>(primitives);
+        if (to_bits(hit == first) == lanes) {
+            if (first != last_) {
+                const Triangle &triangle = tree_.triangles[first];
+                last_normal_ = cross(triangle.b - triangle.a, triangle.c - triangle.a);
+                last_ = first;
+            }
+            return in_all_lanes(last_normal_);
+        }
+        constexpr uint32_t FLOATS = sizeof(Triangle) / sizeof(float);
+        const UIntPacket place =
+            select(from_bits<UIntPacket>(lanes), hit, UIntPacket(first)) * FLOATS;
+        const auto vertex = [&](uint32_t number) {
+            return by_axis([&](int k) {
+                return gather(&tree_.triangles[0].a.x, place + UIntPacket(3 * number + k));
+            });
+        };
+        const Vec3<FloatPacket> a = vertex(0);
+        return cross(vertex(1) - a, vertex(2) - a);
     }
-    constexpr uint32_t FLOATS = sizeof(Triangle) / sizeof(float);
-    const UIntPacket place =
-        select(from_bits<UIntPacket>(lanes), hit, UIntPacket(first)) * FLOATS;
-    const auto vertex = [&](uint32_t number) {
-        return by_axis([&](int k) {
-            return gather(&tree.triangles[0].a.x, place + UIntPacket(3 * number + k));
-        });
-    };
-    const Vec3<FloatPacket> a = vertex(0);
-    return cross(vertex(1) - a, vertex(2) - a);
-}
+
+private:
+    const KdTree &tree_;
+    uint32_t last_ = NO_PRIMITIVE;
+    Vec3f last_normal_;
+};
 
 class TileRenderer {
 public:
     TileRenderer(const KdTree &tree, const View &view, const TraceOptions &options,
                  Counters &counters)
-        : tree_(tree), view_(view), options_(options), counters_(counters) {}
+        : tree_(tree), view_(view), options_(options), counters_(counters), normals_(tree) {
+    }
 
     void trace_primary(const RayTile &tile) {
         rays_.resize(size_t(tile.side) * tile.side);
@@ -132,10 +149,9 @@ private:
         return to_bits(load<UIntPacket>(&rays_.primitive[first]) != NO_PRIMITIVE);
     }
 
-    Shading shaded(size_t first, LaneBits hit) const {
+    Shading shaded(size_t first, LaneBits hit) {
         const FloatPacket t = in_lanes(hit, load<FloatPacket>(&rays_.t[first]));
-        return shade(view_, load_vectors(first), t,
-                     normals(tree_, &rays_.primitive[first], hit));
+        return shade(view_, load_vectors(first), t, normals_(&rays_.primitive[first], hit));
     }
 
     void write(const RayTile &tile, uint32_t block, const FloatPacket &brightness,
@@ -172,6 +188,7 @@ private:
     const View &view_;
     const TraceOptions &options_;
     Counters &counters_;
+    Normals normals_;
     TileRays &rays_ = rays_of_thread();
 };
 

@@ -129,15 +129,15 @@ nb::dict describe(const BeamUnderTest &self) {
     for (uint32_t n = 0; n < beam.count; ++n) {
         const BeamPacket &packet = beam.packets[n];
         nb::dict one;
-        one["active"] = packet.active;
-        one["strays"] = packet.strays;
+        one["active"] = beam.lanes[n].active;
+        one["strays"] = beam.lanes[n].strays;
         const BeamPackets::Run &run = beam.runs[n / PACKET_WIDTH];
         const auto lane = [&](const FloatPacket &packets) {
             return to_lanes<float>(packets)[n % PACKET_WIDTH];
         };
         one["box"] = std::array{lane(run.center_p), lane(run.center_q), lane(run.half_p),
                                 lane(run.half_q)};
-        one["first_ray"] = packet.first_ray;
+        one["first_ray"] = beam.lanes[n].first_ray;
         one["reciprocal_depths"] =
             std::array{run.least[n % PACKET_WIDTH], run.greatest[n % PACKET_WIDTH]};
         const RayBounds &all = run.all;

@@ -39,9 +39,10 @@ void BeamPackets::set_axes(Vec3f d) {
     side = d[k] > 0 ? 1.0f : -1.0f;
 }
 
-FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
-                                     BeamPacket &packet) const {
-    const uint32_t first = packet.first_ray;
+FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last, uint32_t number) {
+    BeamPacket &packet = packets[number];
+    PacketLanes &of_rays = lanes[number];
+    const uint32_t first = of_rays.first_ray;
     const auto [i, j, k] = axes;
     const FloatPacket di = load_padded(rays.direction[i], first, last);
     const FloatPacket dj = load_padded(rays.direction[j], first, last);
@@ -62,16 +63,15 @@ FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
                         ((size_v >= SMALLEST_SLOPE) | (dj == 0.0f));
     const LaneBits finite = to_bits((absolute(di) < INFINITE) & (absolute(dj) < INFINITE) &
                                     (absolute(dk) < INFINITE) & (t_min < t_max));
-    packet.active = to_bits(inside) & finite;
-    packet.found = 0;
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    packet.strays = 0;
-    if (packet.active != finite)
-        packet.strays =
-            finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
+    of_rays.active = to_bits(inside) & finite;
+    of_rays.found = of_rays.strays = 0;
+    if (of_rays.active != finite)
+        of_rays.strays =
+            finite & ~of_rays.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
 
-    set_ends(packet, t_max, main);
-    return masked(packet.active,
+    set_ends(number, t_max, main);
+    return masked(of_rays.active,
                   maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
                           (1 + WIDEN_DEPTH) +
                       SMALLEST_DEPTH,
@@ -80,13 +80,14 @@ FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
 
 // One division for both bounds. What is rounded to a small t_max may exceed it by more than
 // that share, and small depths may have lost digits: nothing is certain of them.
-void BeamPackets::set_ends(BeamPacket &packet, const FloatPacket &t_max,
-                           const FloatPacket &main) const {
+void BeamPackets::set_ends(uint32_t number, const FloatPacket &t_max,
+                           const FloatPacket &main) {
+    BeamPacket &packet = packets[number];
     const FloatPacket end = t_max * main;
     const FloatPacket at_end = 1.0f / end;
     const auto moderate = (t_max >= SMALLEST_END) & (end >= SMALLEST_END);
     packet.least =
-        masked(packet.active,
+        masked(lanes[number].active,
                select(moderate, at_end * (1 - WIDEN_DEPTH), FloatPacket(0.0f)), INFINITE);
     packet.greatest = select(moderate, at_end * (1 + WIDEN_DEPTH), FloatPacket(INFINITE));
 }
@@ -94,21 +95,22 @@ void BeamPackets::set_ends(BeamPacket &packet, const FloatPacket &t_max,
 // Of a packet whose rays are known to be active.
 void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
     BeamPacket &packet = packets[number];
+    const uint32_t first_ray = lanes[number].first_ray;
     const auto component = [&](int axis) {
-        return mlrt::load<FloatPacket>(rays.direction[axis] + packet.first_ray);
+        return mlrt::load<FloatPacket>(rays.direction[axis] + first_ray);
     };
     const FloatPacket main = component(axes[2]) * side;
     const FloatPacket reciprocal = 1.0f / main;
     packet.u = component(axes[0]) * reciprocal;
     packet.v = component(axes[1]) * reciprocal;
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    set_ends(packet, load_padded(rays.t_max, packet.first_ray, rays.count), main);
-    unloaded &= ~(uint64_t(1) << number);
+    set_ends(number, load_padded(rays.t_max, first_ray, rays.count), main);
+    unloaded.remove(number);
 }
 
 void BeamPackets::load_slopes(const RayGroup &rays) {
     for (uint32_t n = 0; n < count; ++n)
-        if (unloaded >> n & 1)
+        if (unloaded.has(n))
             load_camera_packet(rays, n);
 }
 
@@ -128,21 +130,22 @@ void BeamPackets::turn_as_film(const CameraMap &camera) {
 // The direction in which slopes vary most: the greater main axis of their covariance.
 void BeamPackets::turn_as_rays() {
     FloatPacket sum_u = 0.0f, sum_v = 0.0f, sum_uu = 0.0f, sum_uv = 0.0f, sum_vv = 0.0f;
-    uint32_t lanes = 0;
+    uint32_t active = 0;
     for (uint32_t n = 0; n < count; ++n) {
         const BeamPacket &packet = packets[n];
+        const LaneBits of_packet = lanes[n].active;
         const FloatPacket u =
-            masked(packet.active, packet.u - FloatPacket(rectangle.center_u), 0.0f);
+            masked(of_packet, packet.u - FloatPacket(rectangle.center_u), 0.0f);
         const FloatPacket v =
-            masked(packet.active, packet.v - FloatPacket(rectangle.center_v), 0.0f);
+            masked(of_packet, packet.v - FloatPacket(rectangle.center_v), 0.0f);
         sum_u = sum_u + u;
         sum_v = sum_v + v;
         sum_uu = fused(u, u, sum_uu);
         sum_uv = fused(u, v, sum_uv);
         sum_vv = fused(v, v, sum_vv);
-        lanes += uint32_t(__builtin_popcount(packet.active));
+        active += uint32_t(__builtin_popcount(of_packet));
     }
-    const float share = 1.0f / float(lanes);
+    const float share = 1.0f / float(active);
     const float mean_u = sum_of_lanes(sum_u) * share, mean_v = sum_of_lanes(sum_v) * share;
     const float uu = sum_of_lanes(sum_uu) * share - mean_u * mean_u;
     const float uv = sum_of_lanes(sum_uv) * share - mean_u * mean_v;
@@ -180,13 +183,13 @@ void BeamPackets::fit_rectangle() {
         PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
         for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
             const uint32_t n = r * PACKET_WIDTH + i;
-            if (n >= count || packets[n].active == 0) {
+            if (n >= count || lanes[n].active == 0) {
                 lo_p[i] = lo_q[i] = least_of[i] = none_lo;
                 hi_p[i] = hi_q[i] = none_hi;
                 continue;
             }
             const BeamPacket &packet = packets[n];
-            const auto active = from_bits<FloatPacket>(packet.active);
+            const auto active = from_bits<FloatPacket>(lanes[n].active);
             // Inactive lanes repeat the first ray of all.
             const FloatPacket u = select(active, packet.u, first_u);
             const FloatPacket v = select(active, packet.v, first_v);
@@ -248,21 +251,22 @@ void BeamPackets::fit_rectangle() {
 }
 
 void BeamPackets::settle_packet(const RayGroup &rays, uint32_t number) {
-    if (unloaded >> number & 1)
+    if (unloaded.has(number))
         load_camera_packet(rays, number);
-    if (!is_covered(number))
+    if (!covered.has(number))
         return;
     BeamPacket &packet = packets[number];
     const Cover &cover = covers[number];
-    covered &= ~(uint64_t(1) << number);
+    covered.remove(number);
     const FloatPacket depth =
         fused(packet.u, FloatPacket(cover.of_u),
               fused(packet.v, FloatPacket(cover.of_v), FloatPacket(cover.constant)));
     const FloatPacket error(cover.error);
-    packet.found = packet.active;
+    const LaneBits active = lanes[number].active;
+    lanes[number].found = active;
     packet.primitive = UIntPacket(cover.primitive);
     packet.least =
-        masked(packet.active, fused(depth, FloatPacket(cover.shrink), -error), INFINITE);
+        masked(active, fused(depth, FloatPacket(cover.shrink), -error), INFINITE);
     packet.greatest = fused(depth, FloatPacket(cover.grow), error);
 }
 
@@ -274,26 +278,26 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     any_active = any_stray = false;
     if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
         return;
-    covered = unloaded = 0;
-    const BeamPacket *first_active = nullptr;
+    covered = unloaded = {};
+    std::optional<uint32_t> first_active;
     FloatPacket begin = 0.0f, end = 0.0f;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
-        BeamPacket &packet = packets[count++];
-        packet.first_ray = i;
-        begin = maximum(load_packet(rays, first + ray_count, packet), begin);
-        end = maximum(masked(packet.active, packet.greatest, 0.0f), end);
-        if (packet.active != 0 && !first_active)
-            first_active = &packet;
-        any_stray |= packet.strays != 0;
+        const uint32_t n = count++;
+        lanes[n].first_ray = i;
+        begin = maximum(load_packet(rays, first + ray_count, n), begin);
+        end = maximum(masked(lanes[n].active, packets[n].greatest, 0.0f), end);
+        if (lanes[n].active != 0 && !first_active)
+            first_active = n;
+        any_stray |= lanes[n].strays != 0;
     }
     if (!first_active)
         return;
     any_active = true;
     nearest = (1 - WIDEN_DEPTH) / greatest_lane(begin);
-    const uint32_t lane = uint32_t(__builtin_ctz(first_active->active));
+    const uint32_t lane = uint32_t(__builtin_ctz(lanes[*first_active].active));
     rectangle = {};
-    rectangle.center_u = to_lanes<float>(first_active->u)[lane];
-    rectangle.center_v = to_lanes<float>(first_active->v)[lane];
+    rectangle.center_u = to_lanes<float>(packets[*first_active].u)[lane];
+    rectangle.center_v = to_lanes<float>(packets[*first_active].v)[lane];
     if (camera)
         turn_as_film(*camera);
     else

@@ -15,12 +15,12 @@
 
 #include "base/simd.h"
 #include "mlrta/beam.h"
+#include "mlrta/packet_set.h"
 #include "mlrta/range.h"
 #include "traverse/parameter_interval.h"
 #include "traverse/ray_group.h"
 
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <optional>
 
@@ -37,7 +37,17 @@ struct SlopeRectangle {
     float slack = 0; // of the extents, for how p and q of a ray are rounded
 };
 
-// Sixteen rays of a beam and the best that they have found.
+// Sixteen rays of a beam: of the group, and which of them.
+struct PacketLanes {
+    uint32_t first_ray;
+    LaneBits active, found;
+
+    // Rays that do not go along with the beam, or whose direction is so long or short that
+    // slopes or depths could lose it. They are not active here.
+    LaneBits strays;
+};
+
+// Where they go, and the best that they have found.
 //
 // Depths are compared by their reciprocals. The end of a ray's interval counts as what it
 // has found at first. A triangle may be nearer if its reciprocal depth may exceed `least`,
@@ -47,12 +57,6 @@ struct BeamPacket {
     FloatPacket u, v;
     FloatPacket least, greatest; // bounds of 1 / z of the best hit
     UIntPacket primitive;        // of the best hit
-    uint32_t first_ray;          // of the group
-    LaneBits active, found;
-
-    // Rays that do not go along with the beam, or whose direction is so long or short that
-    // slopes or depths could lose it. They are not active here.
-    LaneBits strays;
 };
 
 // Of some rays of a beam, a rectangle parallel to that of the beam and relative to its
@@ -63,15 +67,18 @@ struct RayBounds {
 };
 
 struct BeamPackets {
-    static constexpr uint32_t RUNS = 4; // of sixteen packets
+    static constexpr uint32_t RUNS = 16; // of sixteen packets
     static constexpr uint32_t CAPACITY = RUNS * PACKET_WIDTH;
     static constexpr uint32_t MAX_RAYS = CAPACITY * PACKET_WIDTH;
+    using Packets = PacketSet<RUNS>;
 
     bool parallel;           // whether the rays have a common direction, else origin
     Vec3f origin;            // the common one, or a point that coordinates are relative to
     std::array<int, 3> axes; // i, j, k
     float side;
     uint32_t count; // of packets
+    // Apart, since of most of a camera's packets little else is looked at.
+    std::array<PacketLanes, CAPACITY> lanes;
     std::array<BeamPacket, CAPACITY> packets;
     bool any_active, any_stray;
     float nearest; // reciprocal depths below it lie behind every t_min
@@ -108,19 +115,17 @@ struct BeamPackets {
         float constant, of_u, of_v;
         float shrink, grow, error;
     };
-    uint64_t covered;
+    Packets covered;
     std::array<Cover, CAPACITY> covers;
 
-    bool is_covered(uint32_t number) const { return covered >> number & 1; }
+    // Packets of a camera's rays that have not been looked at: of those only `lanes` are
+    // known.
+    Packets unloaded;
 
-    // Packets of a camera's rays that have not been looked at: of those only `first_ray`,
-    // `active`, `found` and `strays` are known.
-    uint64_t unloaded;
-
-    // Makes all known of those of the given packets of which it is not.
-    void settle(const RayGroup &rays, uint64_t numbers) {
-        for (uint64_t left = numbers & (covered | unloaded); left != 0; left &= left - 1)
-            settle_packet(rays, uint32_t(std::countr_zero(left)));
+    // Makes all known of those of the given packets of a run of which it is not.
+    void settle(const RayGroup &rays, uint32_t run, LaneBits numbers) {
+        for_each_lane(numbers & (covered.run(run) | unloaded.run(run)),
+                      [&](uint32_t i) { settle_packet(rays, run * PACKET_WIDTH + i); });
     }
     // Makes the slopes of all packets known.
     void load_slopes(const RayGroup &rays);
@@ -195,14 +200,12 @@ private:
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);
     // Returns the depths at which rays begin, or zero where they are not active.
-    FloatPacket load_packet(const RayGroup &rays, uint32_t last, BeamPacket &packet) const;
-    FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last,
-                                     BeamPacket &packet, Begin &begin,
-                                     FloatPacket &reach) const;
+    FloatPacket load_packet(const RayGroup &rays, uint32_t last, uint32_t number);
+    FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last, uint32_t number,
+                                     FloatPacket &reach);
     void settle_packet(const RayGroup &rays, uint32_t number);
     void load_camera_packet(const RayGroup &rays, uint32_t number);
-    void set_ends(BeamPacket &packet, const FloatPacket &t_max,
-                  const FloatPacket &main) const;
+    void set_ends(uint32_t number, const FloatPacket &t_max, const FloatPacket &main);
     void fit_to_film(const CameraTile &tile, uint32_t first, const FilmSlopes &slopes);
     void set_middles(const CameraTile &tile, uint32_t first_of_run,
                      const FilmRectangle &packet, LaneBits there, Run &run) const;

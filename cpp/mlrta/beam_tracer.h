@@ -34,11 +34,17 @@ public:
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
         for (uint32_t i = 0; i < count;) {
-            // Aligned, so that beams of both sizes are squares of a camera's rays.
+            const uint32_t left = count - i;
+            // Aligned, so that beams of all sizes are squares of a camera's rays.
+            if (camera_ && i % HUGE_BEAM == 0 && left >= HUGE_BEAM &&
+                trace_huge_beam(first + i, frontier)) {
+                i += HUGE_BEAM;
+                continue;
+            }
             const bool large =
                 camera_ || (i % LARGE_BEAM == 0 &&
                             memory_.triangles_per_ray <= LARGE_TRIANGLES_PER_RAY);
-            const uint32_t rays = std::min(count - i, large ? LARGE_BEAM : SMALL_BEAM);
+            const uint32_t rays = std::min(left, large ? LARGE_BEAM : SMALL_BEAM);
             if (packets_.knows_wide_tree() && patience_.spares_next()) {
                 ++counters_.fallbacks;
                 trace_apart(first + i, rays, frontier);
@@ -55,12 +61,30 @@ private:
 
     // A large beam shares the walk, and what is made of each triangle, by more rays: it
     // pays for a camera's rays, and for others that are as close to each other.
-    static constexpr uint32_t LARGE_BEAM = BeamPackets::MAX_RAYS;
+    static constexpr uint32_t HUGE_BEAM = BeamPackets::MAX_RAYS, LARGE_BEAM = 1024;
     static constexpr uint32_t SMALL_BEAM = RayNumbers::CAPACITY;
 
+    // A beam that is larger still, of a camera's rays. Returns false if it was not tried,
+    // or given up, and has left nothing then.
+    bool trace_huge_beam(uint32_t first, const Frontier &frontier) {
+        struct HugeBeams {};
+        Patience &patience = patience_of_thread<HugeBeams>(&tree_);
+        if ((packets_.knows_wide_tree() && patience_.spares()) || patience.spares_next())
+            return false;
+        const uint64_t before = counters_.beam_triangles;
+        if (!trace_beam(first, HUGE_BEAM, frontier, true)) {
+            patience.lose();
+            return false;
+        }
+        const uint64_t spent = counters_.beam_triangles - before;
+        if (spent > 0 && spent <= MOST_OF_HUGE_BEAM / 2)
+            patience.win();
+        return true;
+    }
+
     // `ordered` tells that neighbours in the group are neighbours in space as well as
-    // regrouping could make them.
-    void trace_beam(uint32_t first, uint32_t count, const Frontier &frontier,
+    // regrouping could make them. Returns false if a huge beam was given up.
+    bool trace_beam(uint32_t first, uint32_t count, const Frontier &frontier,
                     bool ordered) {
         BeamPackets &beam = beam_;
         if constexpr (PARALLEL)
@@ -72,35 +96,41 @@ private:
                 packets_.trace(first, count, frontier);
             else
                 trace_strays(frontier);
-            return;
+            return true;
         }
         if (count > SMALL_BEAM && (beam.any_stray || (!camera_ && leaves_gaps()))) {
             for (uint32_t i = 0; i < count; i += SMALL_BEAM)
                 trace_beam(first + i, std::min(count - i, SMALL_BEAM), frontier, ordered);
-            return;
+            return true;
         }
         if (regroupings_ < MOST_REGROUPINGS) {
             if (beam.any_stray) {
                 set_strays_apart(frontier);
-                return;
+                return true;
             }
             if (!camera_ && count <= SMALL_BEAM && regroup(frontier, ordered))
-                return;
+                return true;
         }
 
         uint32_t active = 0;
         for (uint32_t n = 0; n < beam.count; ++n)
-            active += uint32_t(std::popcount(beam.packets[n].active));
+            active += uint32_t(std::popcount(beam.lanes[n].active));
         counters_.rays += active;
         counters_.packets += beam.count;
         ++counters_.beams;
-        const uint32_t most = options_.traversal == Traversal::adaptive
+        const uint32_t most = count > LARGE_BEAM ? MOST_OF_HUGE_BEAM
+                              : options_.traversal == Traversal::adaptive
                                   ? FREE_TRIANGLES + most_triangles_per_ray() * active
                                   : std::numeric_limits<uint32_t>::max();
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
         const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
                                                          most, beam, counters_);
+        if (!done && count > LARGE_BEAM) {
+            counters_.rays -= active;
+            counters_.packets -= beam.count;
+            return false;
+        }
         const float spent = float(counters_.beam_triangles - before) / float(active);
         if (packets_.knows_wide_tree())
             judge(done, spent);
@@ -109,7 +139,7 @@ private:
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)
-                cost.add_to_lanes(beam.packets[n].first_ray, beam.packets[n].active, share);
+                cost.add_to_lanes(beam.lanes[n].first_ray, beam.lanes[n].active, share);
         counters_.fallbacks += !done;
         if constexpr (Output::query == Query::closest && EXACT_DISTANCES)
             if (done && output_.wants_distances())
@@ -119,6 +149,7 @@ private:
         if (beam.any_stray)
             trace_strays(frontier);
         packets_.flush();
+        return true;
     }
 
     // Whether beams pay, by the triangles that one spent on each of its rays.
@@ -144,12 +175,12 @@ private:
 
     // Writes what a packet has found, or leaves the rest of it to others.
     void finish(uint32_t number, bool done, const Frontier &frontier) {
-        const BeamPacket &packet = beam_.packets[number];
+        const PacketLanes &packet = beam_.lanes[number];
         LaneBits left = done ? 0 : packet.active;
         if constexpr (Output::query == Query::any) {
             output_.set(packet.first_ray, packet.found);
             left &= ~packet.found;
-        } else if (done && beam_.is_covered(number)) {
+        } else if (done && beam_.covered.has(number)) {
             const UIntPacket primitive(beam_.covers[number].primitive);
             if (output_.wants_distances())
                 output_.set(packet.first_ray, packet.active,
@@ -160,10 +191,11 @@ private:
                 output_.set(packet.first_ray, packet.active, primitive);
         } else if (done && packet.found != 0) {
             if (output_.wants_distances())
-                output_.set(packet.first_ray, packet.found, distances_of(packet),
-                            packet.primitive);
+                output_.set(packet.first_ray, packet.found, distances_of(number),
+                            beam_.packets[number].primitive);
             else
-                output_.set(packet.first_ray, packet.found, packet.primitive);
+                output_.set(packet.first_ray, packet.found,
+                            beam_.packets[number].primitive);
         }
         if (left == 0)
             return;
@@ -173,20 +205,21 @@ private:
         packets_.trace_stray(packet.first_ray, left, frontier);
     }
 
-    FloatPacket distances_of(const BeamPacket &packet) {
+    FloatPacket distances_of(uint32_t number) {
+        const PacketLanes &packet = beam_.lanes[number];
         if constexpr (EXACT_DISTANCES)
             return memory_.distances.of(rays_, packet.first_ray, packet.found,
-                                        packet.primitive, counters_);
+                                        beam_.packets[number].primitive, counters_);
         // Reciprocal depths are all that single precision needs.
         const FloatPacket along_main_axis =
             load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count);
-        return 1.0f / (packet.greatest * absolute(along_main_axis));
+        return 1.0f / (beam_.packets[number].greatest * absolute(along_main_axis));
     }
 
     void trace_strays(const Frontier &frontier) {
         for (uint32_t n = 0; n < beam_.count; ++n)
-            if (beam_.packets[n].strays != 0)
-                packets_.trace_lanes(beam_.packets[n].first_ray, beam_.packets[n].strays,
+            if (beam_.lanes[n].strays != 0)
+                packets_.trace_lanes(beam_.lanes[n].first_ray, beam_.lanes[n].strays,
                                      frontier);
     }
 
@@ -194,8 +227,8 @@ private:
     void set_strays_apart(const Frontier &frontier) {
         RayNumbers along, strays;
         for (uint32_t n = 0; n < beam_.count; ++n) {
-            along.add(beam_.packets[n].first_ray, beam_.packets[n].active);
-            strays.add(beam_.packets[n].first_ray, beam_.packets[n].strays);
+            along.add(beam_.lanes[n].first_ray, beam_.lanes[n].active);
+            strays.add(beam_.lanes[n].first_ray, beam_.lanes[n].strays);
         }
         trace_regrouped(along, frontier, false);
         trace_regrouped(strays, frontier, false);
@@ -275,6 +308,11 @@ private:
     static constexpr uint32_t FREE_TRIANGLES = 64;
     static constexpr uint32_t MOST_TRIANGLES_PER_RAY =
         Output::query == Query::any ? 24 : 96;
+
+    // What a huge beam may test before it is divided: where triangles are small, the nearer
+    // ones of them leave more to be tested than smaller beams would. Chosen from 60 to 500
+    // by frames of all of these at 1 and 16 rays a pixel.
+    static constexpr uint32_t MOST_OF_HUGE_BEAM = 120;
 
     // The same where there is the wide tree, which takes less time then. Beams that meet
     // more than DENSE triangles a ray had better not be tried, those that meet less than

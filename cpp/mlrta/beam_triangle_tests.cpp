@@ -76,6 +76,8 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     counters_.beam_triangles += tested;
     triangles_left_ -= std::min(triangles_left_, tested);
     tested_ += tested;
+    if (query == Query::closest && spent())
+        return; // nobody will look at what is found
     if (tested_ > DENSE_TRIANGLES && !dense_) {
         beam_.load_slopes(rays_);
         grid_.fill(beam_);
@@ -100,7 +102,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     bool any_covered = false;
     LaneBits hit = 0;
     uint32_t pairs = 0;
-    uint64_t in_pairs = 0; // packets
+    BeamPackets::Packets in_pairs;
     for (uint32_t i = 0; i < run_pairs; ++i) {
         const uint32_t first = of_runs[i];
         const uint32_t n = first % BeamPackets::CAPACITY / PACKET_WIDTH,
@@ -112,7 +114,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         } else {
             const auto coverage = forms.coverage_of(lane, beam_, run);
             packets = coverage.possible & ~coverage.covered;
-            in_pairs |= uint64_t(packets) << n * PACKET_WIDTH;
+            in_pairs.run(n) |= packets;
             if (coverage.covered != 0) {
                 cover(n, coverage, forms, lane, numbers[lane]);
                 any_covered = true;
@@ -125,20 +127,23 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     }
     counters_.triangle_tests += pairs;
     if constexpr (query == Query::closest)
-        beam_.settle(rays_, in_pairs);
-    uint64_t changed = 0;
+        for (uint32_t n = 0; n < beam_.run_count(); ++n)
+            beam_.settle(rays_, n, in_pairs.run(n));
+    BeamPackets::Packets changed;
+    bool any_changed = false;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = pairs_[i] % BeamPackets::CAPACITY,
                        lane = pairs_[i] / BeamPackets::CAPACITY;
         const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
-        changed |= uint64_t(found) << n;
+        changed.run(n / PACKET_WIDTH) |= found << n % PACKET_WIDTH;
         hit |= found << lane;
+        any_changed |= found != 0;
     }
     for_each_lane(hit, [&](uint32_t lane) {
         if (hit_count_ < hit_.size())
             hit_[hit_count_++] = numbers[lane];
     });
-    if (changed != 0)
+    if (any_changed)
         update_least(changed);
     else if (any_covered)
         update_least();
@@ -160,7 +165,7 @@ void BeamTriangleTests<query>::cover(uint32_t number,
     raise(run.greatest, coverage.greatest);
     run.all.least = least_lane(load<FloatPacket>(run.least));
     const uint32_t first = number * PACKET_WIDTH;
-    beam_.covered |= uint64_t(coverage.covered) << first;
+    beam_.covered.run(number) |= coverage.covered;
     constexpr int DEPTH = TriangleForms::DEPTH;
     const BeamPackets::Cover cover{primitive,
                                    forms.constant[DEPTH][lane],
@@ -174,9 +179,8 @@ void BeamTriangleTests<query>::cover(uint32_t number,
 
 // A triangle as sixteen rays see it.
 template <Query query>
-BeamTriangleTests<query>::Seen BeamTriangleTests<query>::see(uint32_t number,
-                                                             const TriangleForms &forms,
-                                                             uint32_t lane) const {
+auto BeamTriangleTests<query>::see(uint32_t number, const TriangleForms &forms,
+                                   uint32_t lane) const -> Seen {
     const BeamPacket &packet = beam_.packets[number];
     const auto value = [&](int form) {
         return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
@@ -211,7 +215,7 @@ bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms 
                                            uint32_t lane, uint32_t primitive) {
     const Seen seen = see(number, forms, lane);
     const LaneBits found = to_bits(seen.possible & seen.certain & seen.nearer);
-    take(beam_.packets[number], found, seen.lowest, seen.highest, primitive);
+    take(number, found, seen.lowest, seen.highest, primitive);
     const LaneBits open = EXACT ? to_bits(seen.possible) & ~found : 0;
     if (open != 0) [[unlikely]]
         return decide_open(number, forms, lane, primitive, open);
@@ -223,16 +227,17 @@ template <Query query>
 [[gnu::noinline]] bool
 BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &forms,
                                       uint32_t lane, uint32_t primitive, LaneBits open) {
-    decide(beam_.packets[number], open, see(number, forms, lane), primitive);
+    decide(number, open, see(number, forms, lane), primitive);
     return true;
 }
 
 // Hits of a triangle at depths that have these bounds.
 template <Query query>
-void BeamTriangleTests<query>::take(BeamPacket &packet, LaneBits lanes,
+void BeamTriangleTests<query>::take(uint32_t number, LaneBits lanes,
                                     const FloatPacket &lowest, const FloatPacket &highest,
                                     uint32_t primitive) {
-    packet.found |= lanes;
+    BeamPacket &packet = beam_.packets[number];
+    beam_.lanes[number].found |= lanes;
     const auto mask = from_bits<FloatPacket>(lanes);
     if constexpr (query == Query::any) {
         packet.least = select(mask, FloatPacket(INFINITE), packet.least);
@@ -247,17 +252,18 @@ void BeamTriangleTests<query>::take(BeamPacket &packet, LaneBits lanes,
 // By the contract of geometry/triangle_test.h. Where a depth certainly is the nearest, only
 // whether the ray hits is decided.
 template <Query query>
-void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes, const Seen &seen,
+void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const Seen &seen,
                                       uint32_t primitive) {
-    const LaneBits certain_hits = to_bits(seen.certain);
-    const LaneBits certainly_nearer = to_bits(seen.nearer);
+    const LaneBits certain_hits = to_bits(seen.certain), nearest = to_bits(seen.nearer);
     if (query == Query::any && beam_.parallel) {
-        decide_parallel(packet, lanes, certain_hits, primitive);
+        decide_parallel(number, lanes, certain_hits, primitive);
         return;
     }
+    BeamPacket &packet = beam_.packets[number];
+    const PacketLanes &of_rays = beam_.lanes[number];
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
-    for_each_value(packet.primitive, lanes & packet.found & ~certainly_nearer,
+    for_each_value(packet.primitive, lanes & of_rays.found & ~nearest,
                    [&](uint32_t rival, LaneBits holders) {
                        if (rival != primitive && !in_one_plane(tree_.triangles[rival],
                                                                tree_.triangles[primitive]))
@@ -271,61 +277,64 @@ void BeamTriangleTests<query>::decide(BeamPacket &packet, LaneBits lanes, const 
     LaneBits hits = lanes & certain_hits;
     for_each_lane(lanes & ~certain_hits, [&](uint32_t lane) {
         const HitDecision decision =
-            decide_hit(beam_.origin, direction_of(rays_, packet.first_ray + lane),
+            decide_hit(beam_.origin, direction_of(rays_, of_rays.first_ray + lane),
                        tree_.triangles[primitive]);
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
-    take(packet, hits & certainly_nearer, seen.lowest, seen.highest, primitive);
-    hits &= ~certainly_nearer;
-    const UIntPacket number(primitive);
+    take(number, hits & nearest, seen.lowest, seen.highest, primitive);
+    hits &= ~nearest;
+    const UIntPacket challenger(primitive);
     tied &= hits;
-    packet.primitive = select(from_bits<UIntPacket>(tied), number, packet.primitive);
+    packet.primitive = select(from_bits<UIntPacket>(tied), challenger, packet.primitive);
     hits &= ~tied;
     if (hits == 0)
         return;
 
     const auto distances = [&](LaneBits of, const UIntPacket &primitives) {
-        return distances_.of(rays_, packet.first_ray, of, primitives, counters_);
+        return distances_.of(rays_, of_rays.first_ray, of, primitives, counters_);
     };
-    const FloatPacket t = distances(hits, number);
-    const FloatPacket t_min = load_padded(rays_.t_min, packet.first_ray, rays_.count);
-    const FloatPacket t_max = load_padded(rays_.t_max, packet.first_ray, rays_.count);
+    const FloatPacket t = distances(hits, challenger);
+    const FloatPacket t_min = load_padded(rays_.t_min, of_rays.first_ray, rays_.count);
+    const FloatPacket t_max = load_padded(rays_.t_max, of_rays.first_ray, rays_.count);
     hits &= to_bits((t > maximum(t_min, FloatPacket(0.0f))) & (t < INFINITE));
-    if (const LaneBits rivals = hits & packet.found; rivals != 0) {
+    if (const LaneBits rivals = hits & of_rays.found; rivals != 0) {
         const FloatPacket other = distances(rivals, packet.primitive);
         const LaneBits nearer =
-            to_bits(t < other) | (to_bits(t == other) & to_bits(number < packet.primitive));
+            to_bits(t < other) |
+            (to_bits(t == other) & to_bits(challenger < packet.primitive));
         hits &= nearer | ~rivals;
     }
-    hits &= to_bits(t <= t_max) | packet.found;
+    hits &= to_bits(t <= t_max) | of_rays.found;
     if (hits == 0)
         return;
 
     if constexpr (query == Query::any) {
-        take(packet, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
+        take(number, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
         return;
     }
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
     // denormal.
     const DoublePacket main = absolute(to_double(
-        load_padded(rays_.direction[beam_.axes[2]], packet.first_ray, rays_.count)));
+        load_padded(rays_.direction[beam_.axes[2]], of_rays.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
-    take(packet, hits,
+    take(number, hits,
          minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
          FloatPacket((1 + 0x1p-21) / (distance * main)), primitive);
 }
 
 // The same for rays that each have an origin, of Query::any.
 template <Query query>
-void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lanes,
+void BeamTriangleTests<query>::decide_parallel(uint32_t number, LaneBits lanes,
                                                LaneBits certain_hits, uint32_t primitive) {
     counters_.double_tests += uint64_t(std::popcount(lanes));
     const Triangle &triangle = tree_.triangles[primitive];
+    BeamPacket &packet = beam_.packets[number];
+    PacketLanes &of_rays = beam_.lanes[number];
     LaneBits hits = 0;
     for_each_lane(lanes, [&](uint32_t lane) {
-        const Ray ray = ray_of(rays_, packet.first_ray + lane);
+        const Ray ray = ray_of(rays_, of_rays.first_ray + lane);
         if ((certain_hits >> lane & 1) == 0) {
             const HitDecision decision = decide_hit(ray.origin, ray.direction, triangle);
             counters_.exact_tests += decision.precision == Precision::exact;
@@ -336,7 +345,7 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
         hits |= LaneBits(t > std::max(ray.t_min, 0.0f) && t <= ray.t_max && t < INFINITE)
                 << lane;
     });
-    packet.found |= hits;
+    of_rays.found |= hits;
     packet.least =
         select(from_bits<FloatPacket>(hits), FloatPacket(INFINITE), packet.least);
 }
@@ -344,20 +353,21 @@ void BeamTriangleTests<query>::decide_parallel(BeamPacket &packet, LaneBits lane
 // A triangle of which the forms say nothing, such as one whose plane holds the origin.
 template <Query query>
 void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
-    beam_.settle(rays_, ~uint64_t(0));
+    for (uint32_t n = 0; n < beam_.run_count(); ++n)
+        beam_.settle(rays_, n, ALL_LANES);
     for (uint32_t n = 0; n < beam_.count; ++n) {
-        BeamPacket &packet = beam_.packets[n];
-        decide(packet, packet.active & to_bits(packet.least < INFINITE), {}, primitive);
+        const LaneBits searching = to_bits(beam_.packets[n].least < INFINITE);
+        decide(n, beam_.lanes[n].active & searching, {}, primitive);
     }
     counters_.triangle_tests += beam_.count;
-    update_least(~uint64_t(0) >> (BeamPackets::CAPACITY - beam_.count));
+    update_least(BeamPackets::Packets::of_first(beam_.count));
 }
 
 // After some packets have found something.
 template <Query query>
-void BeamTriangleTests<query>::update_least(uint64_t packets) {
-    for (uint32_t n = 0; n < beam_.run_count(); ++n, packets >>= PACKET_WIDTH) {
-        const LaneBits changed = LaneBits(packets) & ALL_LANES;
+void BeamTriangleTests<query>::update_least(const BeamPackets::Packets &packets) {
+    for (uint32_t n = 0; n < beam_.run_count(); ++n) {
+        const LaneBits changed = packets.run(n);
         if (changed == 0)
             continue;
         BeamPackets::Run &run = beam_.runs[n];

@@ -66,12 +66,12 @@ private:
     Seen see(uint32_t packet, const TriangleForms &forms, uint32_t lane) const;
     bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive, LaneBits open);
-    void decide(BeamPacket &packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
-    void take(BeamPacket &packet, LaneBits lanes, const FloatPacket &lowest,
+    void decide(uint32_t packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
+    void take(uint32_t packet, LaneBits lanes, const FloatPacket &lowest,
               const FloatPacket &highest, uint32_t primitive);
-    void decide_parallel(BeamPacket &packet, LaneBits lanes, LaneBits certain_hits,
+    void decide_parallel(uint32_t packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
-    void update_least(uint64_t packets);
+    void update_least(const BeamPackets::Packets &packets);
     void update_least();
 
     const KdTree &tree_;

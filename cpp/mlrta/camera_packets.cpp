@@ -62,13 +62,10 @@ bool BeamPackets::load_camera(const RayGroup &rays, uint32_t first, uint32_t ray
     count = ray_count / PACKET_WIDTH;
     any_active = true;
     any_stray = false;
-    covered = 0;
-    unloaded = ~uint64_t(0) >> (CAPACITY - count);
+    covered = {};
+    unloaded = Packets::of_first(count);
     for (uint32_t n = 0; n < count; ++n) {
-        BeamPacket &packet = packets[n];
-        packet.first_ray = first + n * PACKET_WIDTH;
-        packet.active = ALL_LANES;
-        packet.found = packet.strays = 0;
+        lanes[n] = {first + n * PACKET_WIDTH, ALL_LANES, 0, 0};
     }
     set_camera_ends(camera.t_min, camera.t_max, slopes.main());
     fit_to_film(tile, first, slopes);

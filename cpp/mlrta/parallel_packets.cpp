@@ -56,9 +56,11 @@ bool are_parallel(const RayGroup &rays) {
 // Returns how far slopes of the rays deviate from the beam's, zero where they are not
 // active, and widens `reach` to the coordinates of their origins.
 FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t last,
-                                              BeamPacket &packet, Begin &begin,
-                                              FloatPacket &reach) const {
-    const uint32_t first = packet.first_ray;
+                                              uint32_t number, FloatPacket &reach) {
+    BeamPacket &packet = packets[number];
+    PacketLanes &of_rays = lanes[number];
+    Begin &begin = begins[number];
+    const uint32_t first = of_rays.first_ray;
     const auto [i, j, k] = axes;
     const FloatPacket di = load_padded(rays.direction[i], first, last);
     const FloatPacket dj = load_padded(rays.direction[j], first, last);
@@ -87,12 +89,12 @@ FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t las
         to_bits((absolute(di) < INFINITE) & (absolute(dj) < INFINITE) &
                 (absolute(dk) < INFINITE) & (absolute(oi) < INFINITE) &
                 (absolute(oj) < INFINITE) & (absolute(ok) < INFINITE) & (t_min < t_max));
-    packet.active = to_bits(inside) & finite;
-    packet.found = 0;
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    packet.strays =
-        finite & ~packet.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
-    reach = maximum(masked(packet.active, own_reach, 0.0f), reach);
+    of_rays.active = to_bits(inside) & finite;
+    of_rays.found = 0;
+    of_rays.strays =
+        finite & ~of_rays.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
+    reach = maximum(masked(of_rays.active, own_reach, 0.0f), reach);
 
     const auto around = [&](const FloatPacket &t, FloatPacket &least,
                             FloatPacket &greatest) {
@@ -108,10 +110,10 @@ FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t las
     };
     FloatPacket least;
     around(t_max, least, packet.greatest);
-    packet.least = masked(packet.active, least, INFINITE);
+    packet.least = masked(of_rays.active, least, INFINITE);
     around(t_min, begin.least, begin.greatest);
-    begin.greatest = masked(packet.active, begin.greatest, -INFINITE);
-    return masked(packet.active, deviates, 0.0f);
+    begin.greatest = masked(of_rays.active, begin.greatest, -INFINITE);
+    return masked(of_rays.active, deviates, 0.0f);
 }
 
 // Loads rays relative to one of them, and keeps how far they deviate from it.
@@ -127,14 +129,12 @@ void BeamPackets::load_around(uint32_t middle, const RayGroup &rays, uint32_t fi
     slope_v = direction[j] / std::abs(direction[k]);
     FloatPacket most_deviation = 0.0f, reach = 0.0f;
     for (uint32_t at = first; at < first + ray_count; at += PACKET_WIDTH) {
-        BeamPacket &packet = packets[count];
-        packet.first_ray = at;
-        most_deviation = maximum(
-            load_parallel_packet(rays, first + ray_count, packet, begins[count], reach),
-            most_deviation);
-        any_active |= packet.active != 0;
-        any_stray |= packet.strays != 0;
-        ++count;
+        const uint32_t n = count++;
+        lanes[n].first_ray = at;
+        most_deviation = maximum(load_parallel_packet(rays, first + ray_count, n, reach),
+                                 most_deviation);
+        any_active |= lanes[n].active != 0;
+        any_stray |= lanes[n].strays != 0;
     }
     // A slope has two roundings and its deviation one; u and v have four.
     const float slopes = 1 + std::max(std::abs(slope_u), std::abs(slope_v));
@@ -146,7 +146,7 @@ void BeamPackets::load_around(uint32_t middle, const RayGroup &rays, uint32_t fi
 void BeamPackets::load_parallel(const RayGroup &rays, uint32_t first, uint32_t ray_count,
                                 const Box3f &scene) {
     parallel = true;
-    covered = unloaded = 0;
+    covered = unloaded = {};
     nearest = 0;
     count = 0;
     any_active = any_stray = false;
@@ -177,7 +177,7 @@ std::optional<uint32_t> BeamPackets::stray_of_most() const {
     int active = 0, strays = 0;
     std::optional<uint32_t> first;
     for (uint32_t n = 0; n < count; ++n) {
-        const BeamPacket &packet = packets[n];
+        const PacketLanes &packet = lanes[n];
         active += std::popcount(packet.active);
         strays += std::popcount(packet.strays);
         if (!first && packet.strays != 0)
@@ -188,8 +188,8 @@ std::optional<uint32_t> BeamPackets::stray_of_most() const {
 
 void BeamPackets::set_all_apart() {
     for (uint32_t n = 0; n < count; ++n) {
-        packets[n].strays |= packets[n].active;
-        packets[n].active = 0;
+        lanes[n].strays |= lanes[n].active;
+        lanes[n].active = 0;
     }
     any_active = false;
     any_stray = true;

@@ -41,7 +41,7 @@ ParallelWalk::ParallelWalk(const KdTree &tree, const BeamPackets &beam,
 
     FloatPacket begin = INFINITE;
     for (uint32_t n = 0; n < beam.count; ++n)
-        begin = minimum(select(from_bits<FloatPacket>(beam.packets[n].active),
+        begin = minimum(select(from_bits<FloatPacket>(beam.lanes[n].active),
                                -beam.begins[n].greatest, FloatPacket(INFINITE)),
                         begin);
     begin_ = least_lane(begin);

@@ -11,6 +11,8 @@ namespace mlrt {
 class Patience {
 public:
     // Whether the next beam should not be tried.
+    bool spares() const { return left_ > 0; }
+    // The same, and counts it.
     bool spares_next() {
         if (left_ == 0)
             return false;

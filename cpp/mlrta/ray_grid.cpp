@@ -32,7 +32,7 @@ void RayGrid::fill(const BeamPackets &beam) {
         const BeamPacket &packet = beam.packets[n];
         const LaneArray<uint32_t> p = cells(beam.along_p(packet), scale_p_);
         const LaneArray<uint32_t> q = cells(beam.along_q(packet), scale_q_);
-        for_each_lane(packet.active,
+        for_each_lane(beam.lanes[n].active,
                       [&](uint32_t lane) { rows[q[lane]] |= uint64_t(1) << p[lane]; });
     }
     for (size_t k = 1; k < rows_.size(); ++k)

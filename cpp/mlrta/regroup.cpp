@@ -50,7 +50,7 @@ Occupancy::Occupancy(const BeamPackets &beam) {
         const UIntPacket column(cell_of(beam, packet, 0)), row(cell_of(beam, packet, 1));
         const UIntPacket cell = UIntPacket(SIDE) * row + column;
         store(&cell_[n * PACKET_WIDTH], cell);
-        const UIntPacket bit = select(from_bits<UIntPacket>(packet.active),
+        const UIntPacket bit = select(from_bits<UIntPacket>(beam.lanes[n].active),
                                       one << (cell & UIntPacket(HALF - 1)), none);
         const auto in_lower = cell < UIntPacket(HALF);
         lower = lower | select(in_lower, bit, none);
@@ -95,7 +95,7 @@ bool Occupancy::is_disordered(const BeamPackets &beam) const {
 void Occupancy::divide(const BeamPackets &beam, Cut cut, RayNumbers &before,
                        RayNumbers &beyond) const {
     for (uint32_t n = 0; n < beam.count; ++n) {
-        const BeamPacket &packet = beam.packets[n];
+        const PacketLanes &packet = beam.lanes[n];
         const auto cell = load<UIntPacket>(&cell_[n * PACKET_WIDTH]);
         const UIntPacket along =
             cut.axis == 0 ? cell & UIntPacket(SIDE - 1) : cell / UIntPacket(SIDE);
@@ -114,9 +114,8 @@ RayNumbers Occupancy::sorted(const BeamPackets &beam) const {
     };
     const auto for_each_ray = [&](auto &&visit) {
         for (uint32_t n = 0; n < beam.count; ++n)
-            for_each_lane(beam.packets[n].active, [&](uint32_t lane) {
-                visit(beam.packets[n].first_ray + lane,
-                      code(cell_[n * PACKET_WIDTH + lane]));
+            for_each_lane(beam.lanes[n].active, [&](uint32_t lane) {
+                visit(beam.lanes[n].first_ray + lane, code(cell_[n * PACKET_WIDTH + lane]));
             });
     };
     for_each_ray([&](uint32_t, int cell) { ++first[cell + 1]; });

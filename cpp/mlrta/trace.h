@@ -19,7 +19,7 @@ enum class Traversal : uint32_t {
     packet,      // X2: 16 rays at a time, an interval each
     interval,    // X3: 16 rays at a time, one interval for all (Reshetov et al. 2005,
                  // section 3.3)
-    beam_leaf,   // X4: beams of up to 1024 rays, if they have a common origin or, where any
+    beam_leaf,   // X4: beams of up to 4096 rays, if they have a common origin or, where any
                  // hit will do, a common direction or not much between where they begin and
                  // end; else X2
     wide,     // through the wide tree, as packets where rays have a common origin and one

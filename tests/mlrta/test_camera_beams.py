@@ -99,7 +99,7 @@ def test_the_film_bounds_all_rays(core: ModuleType, samples: int) -> None:
         tile = random_tile(rng, samples, max(16 // samples, 4))
         t_min, t_max = float(rng.choice([0, 0.5])), float(rng.choice([2, 1e4, np.inf]))
         for count in (16, 64, 256, tile.count):
-            if count > min(tile.count, 1024):
+            if count > tile.count:
                 continue
             first = int(rng.integers(tile.count // count)) * count
             told = beam_of(core, tile, first, count, t_min, t_max).describe()
@@ -107,6 +107,22 @@ def test_the_film_bounds_all_rays(core: ModuleType, samples: int) -> None:
             if told["is_by_film"]:
                 assert_bounds(told, tile, first, count, t_min, t_max)
     assert by_film > 20, SEED
+
+
+@each_core
+@pytest.mark.parametrize(("samples", "size"), [(1, 64), (16, 16)])
+def test_the_film_bounds_all_rays_of_the_largest_beams(
+    core: ModuleType, samples: int, size: int
+) -> None:
+    rng = np.random.default_rng([SEED, samples, size])
+    by_film = 0
+    while by_film < 2:
+        tile = random_tile(rng, samples, size)
+        assert tile.count == 4096
+        told = beam_of(core, tile, 0, tile.count, 0.5, 1e4).describe()
+        by_film += told["is_by_film"]
+        if told["is_by_film"]:
+            assert_bounds(told, tile, 0, tile.count, 0.5, 1e4)
 
 
 def assert_bounds(
