@@ -61,6 +61,8 @@ Occupancy::Occupancy(const BeamPackets &beam) {
 
 std::optional<Occupancy::Cut> Occupancy::best_cut(float share) const {
     int best_area = int(area_around(cells_) * share);
+    if (std::popcount(cells_) > best_area) // parts are no smaller than what they hold
+        return std::nullopt;
     std::optional<Cut> best;
     for (int cell = 1; cell < SIDE; ++cell) {
         const uint64_t row_mask = ((1ull << cell) - 1) * 0x0101010101010101ull;
