@@ -65,6 +65,7 @@ void HitDistances::put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitive
     const Real inverse = 1.0 / numerator.value, size = absolute(inverse);
 
     constexpr size_t COLUMNS = 8; // as Planes has them
+    static_assert(sizeof(Plane) == COLUMNS * sizeof(float));
     std::array<std::array<float, BLOCK_WIDTH>, COLUMNS> columns;
     Real extent = 0.0;
     for (int k = 0; k < 3; ++k) {
@@ -86,7 +87,7 @@ void HitDistances::put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitive
         rows[n] = columns[n].data();
     const std::array<FloatBlock, BLOCK_WIDTH> by_plane = load_columns(rows);
     for (size_t n = 0; n < BLOCK_WIDTH; ++n) {
-        store(planes_[primitives[n] % SIZE].normal, by_plane[n]);
+        store(reinterpret_cast<float *>(&planes_[primitives[n] % SIZE]), by_plane[n]);
         known_[primitives[n] % SIZE] = primitives[n];
     }
 }
