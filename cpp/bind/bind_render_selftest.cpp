@@ -6,6 +6,7 @@
 #include "render/emitter_sampling.h"
 #include "render/face_cache.h"
 #include "render/film_blocks.h"
+#include "render/number_packets.h"
 #include "render/picture_film.h"
 #include "render/picture_memory.h"
 #include "render/sampler.h"
@@ -46,6 +47,27 @@ std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t 
     std::vector<float> numbers(dimensions);
     for (float &number : numbers)
         number = random.next_float();
+    return numbers;
+}
+
+// Of sixteen streams, what each draws: 2 numbers, 1 number, or one that is dropped for 0.
+std::vector<std::vector<float>> packet_streams(const std::vector<uint32_t> &seeds,
+                                               const std::vector<uint32_t> &indices,
+                                               const std::vector<int> &drawn) {
+    std::vector<LaneArray<float>> x(drawn.size()), y(drawn.size());
+    std::vector<NumberPair> pairs;
+    for (size_t i = 0; i < drawn.size(); ++i)
+        pairs.push_back(
+            {drawn[i] > 0 ? x[i].data() : nullptr, drawn[i] > 1 ? y[i].data() : nullptr});
+    draw_numbers(seeds.data(), indices.data(), PACKET_WIDTH, pairs);
+    std::vector<std::vector<float>> numbers(PACKET_WIDTH);
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        for (size_t i = 0; i < drawn.size(); ++i) {
+            if (drawn[i] > 0)
+                numbers[lane].push_back(x[i][lane]);
+            if (drawn[i] > 1)
+                numbers[lane].push_back(y[i][lane]);
+        }
     return numbers;
 }
 
@@ -244,6 +266,10 @@ nb::dict robust_segment_of(const SceneHandle &handle, const Floats3 &origin,
 
 void bind_render_selftest(nb::module_ &m) {
     nb::module_ s = m.def_submodule("render_selftest", "Parts of the renderer, for tests.");
+    s.def(
+        "packet_streams", &packet_streams, nb::arg("seeds"), nb::arg("indices"),
+        nb::arg("drawn"),
+        "Numbers of sixteen streams; drawn: 2 or 1 at a time, 0 for one that is dropped.");
     s.def("sampler_stream", &sampler_stream, nb::arg("seed"), nb::arg("pixel_count"),
           nb::arg("samples"), nb::arg("pixel"), nb::arg("sample"), nb::arg("dimensions"));
     s.def("spread_sample", &spread_sample, nb::arg("sampler"), nb::arg("seed"),

@@ -64,8 +64,9 @@ void TileRenderer::add_weighted_sample(const HitPacket &hit,
                                   cos_light;
         const ShadowSegment<FloatPacket> segment =
             shadow_segment(scene_, offset_, hit, point, emitter, light);
-        shadows_[emitter].append(lit, hit, segment.start, segment.target,
-                                 (scattering.albedo * share) * light.weight);
+        shadows_[emitter].append(
+            lit, reflected_.add(hit, (scattering.albedo * share) * light.weight),
+            segment.start, segment.target);
     });
 }
 

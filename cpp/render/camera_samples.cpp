@@ -1,6 +1,7 @@
 #include "render/camera_samples.h"
 
 #include "base/simd.h"
+#include "render/number_packets.h"
 #include "render/unit_disk.h"
 
 #include <algorithm>

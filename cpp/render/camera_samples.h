@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/aligned_vector.h"
+#include "base/simd.h"
 #include "render/filter.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
@@ -33,6 +34,12 @@ public:
     size_t count() const { return count_; }
     size_t padded_count() const { return column_.size(); }
     const float *direction(int axis) const { return direction_[axis].data(); }
+    // Of a packet.
+    Vec3<FloatPacket> directions(size_t first) const {
+        return {load<FloatPacket>(direction_[0].data() + first),
+                load<FloatPacket>(direction_[1].data() + first),
+                load<FloatPacket>(direction_[2].data() + first)};
+    }
     // Where rays begin, if they do not all begin at the camera's origin.
     const float *origin(int axis) const { return origin_[axis].data(); }
     // Positions on the film: any value if they are not wanted.

@@ -26,6 +26,8 @@ public:
     // 1 / sum of the weights; 0 if there is no weight at all.
     float normalization() const { return normalization_; }
 
+    float probability(uint32_t index) const { return weights_[index] * normalization_; }
+
     // Needs a positive sum of weights. `random` is in [0, 1).
     Choice choose(float random) const;
 
@@ -40,6 +42,17 @@ public:
         }
     };
     Choices choose(const FloatPacket &random) const;
+
+    // The same without what belongs to it: where there are few things.
+    UIntPacket index_of(const FloatPacket &random) const {
+        const FloatPacket target = random * sum_;
+        UIntPacket index(first_);
+        for (uint32_t i = first_; i < last_; ++i) {
+            const LaneBits less = to_bits(FloatPacket(cumulative_[i]) < target);
+            index = select(from_bits<UIntPacket>(less), UIntPacket(i + 1), index);
+        }
+        return index;
+    }
 
 private:
     Choices choose_by_comparing_all(const FloatPacket &random) const;

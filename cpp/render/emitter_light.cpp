@@ -151,9 +151,10 @@ void TileRenderer::add_light(const ShadedPacket &packet, LaneBits lanes,
         return;
     const FloatPacket share = factors_of(emitters, lanes) * cos_light;
     const Vec3<FloatPacket> reflected = (packet.albedo * share) * light.weight;
+    const uint32_t number = reflected_.add(hit, reflected);
     const auto append = [&](uint32_t emitter, LaneBits lit,
                             const ShadowSegment<FloatPacket> &segment) {
-        shadows_[emitter].append(lit, hit, segment.start, segment.target, reflected);
+        shadows_[emitter].append(lit, number, segment.start, segment.target);
     };
     if (offset_ == ShadowOffset::mitsuba) {
         const ShadowSegment<FloatPacket> segment = mitsuba_segment(point, light);

@@ -1,6 +1,7 @@
 #include "render/emitter_sampling.h"
 
 #include "render/analytic_emitter.h"
+#include "render/area_light.h"
 #include "render/point_light.h"
 #include "render/textured_light.h"
 
@@ -93,13 +94,11 @@ template <typename Real>
     return point;
 }
 
-// Mitsuba's rectangle.cpp, sample_position.
 template <typename Real>
 AreaPoint<Real> sample_rectangle(const Emitter &emitter, const Shape &shape,
                                  const EmitterTable &table, const Real &x, const Real &y) {
-    return {spread<Real>(emitter.corner) + x * spread<Real>(emitter.edge_u) +
-                y * spread<Real>(emitter.edge_v),
-            spread<Real>(table.normal), all_of<Real>(shape.first_face)};
+    return {point_on_rectangle(emitter, x, y), spread<Real>(table.normal),
+            all_of<Real>(shape.first_face)};
 }
 
 // A point of an analytic shape that glows, with its density by solid angle.
@@ -235,7 +234,6 @@ EmitterSample<Real> from_surface(const PreparedScene &scene, uint32_t number,
     const Emitter &emitter = scene.data.emitters[number];
     const EmitterTable &table = scene.emitter_tables[number];
     const Shape &shape = scene.data.shapes[emitter.shape];
-    const Real zero(0.0f), one(1.0f);
     AreaPoint<Real> point;
     Real by_area(table.inverse_area);
     Vec3<Real> radiance = spread<Real>(emitter.radiance);
@@ -249,19 +247,15 @@ EmitterSample<Real> from_surface(const PreparedScene &scene, uint32_t number,
     } else {
         point = sample_mesh(scene, shape, table, x, y);
     }
-    const Vec3<Real> to_light = point.p - p;
-    const Real squared = dot(to_light, to_light);
-    const Vec3<Real> direction = to_light * (one / square_root(squared));
-    const Real cosine = dot(direction, point.normal);
-    const Real by_direction = by_area * (squared / -cosine);
-    // False also for a point on the light itself, where the direction is not a number.
-    const MaskOf<Real> has_light =
-        (cosine < zero) & (by_direction > zero) & (by_direction < Real(INFINITY));
-    const Real factor = choice_weight / by_direction;
+    const AreaLightSample<Real> light =
+        sample_area_light(point.p, point.normal, by_area, p);
+    const Real factor = choice_weight / light.density;
     if (density)
-        *density = by_direction / choice_weight;
-    return {by_axis([&](int k) { return select(has_light, factor * radiance[k], zero); }),
-            direction, point.p, point.face};
+        *density = light.density / choice_weight;
+    return {by_axis([&](int k) {
+                return select(light.has_light, factor * radiance[k], Real(0.0f));
+            }),
+            light.direction, point.p, point.face};
 }
 
 // Light of one emitter; choice_weight is 1 / the probability that it was chosen. `density`
@@ -323,6 +317,8 @@ OneEmitterSample sample_emitter(const PreparedScene &scene, Vec3f p, float x, fl
 }
 
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x) {
+    if (scene.few_points)
+        return choose_few_points(scene, x);
     const uint32_t count = uint32_t(scene.data.emitters.size());
     if (count == 1)
         return {UIntPacket(0u), FloatPacket(1.0f), x};
@@ -350,7 +346,8 @@ EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 LaneBits lanes,
                                                 const Vec3<FloatPacket> &p) {
     if (scene.few_points)
-        return from_point(lights_of(*scene.few_points, choices.emitter), choices.weight, p);
+        return from_point(lights_of(scene.few_points->lights, choices.emitter),
+                          choices.weight, p);
     const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
     PointLight<FloatPacket> lights = lights_in_all_lanes(scene.emitter_tables[first].point);
     const LaneBits others = lanes & ~to_bits(choices.emitter == UIntPacket(first));

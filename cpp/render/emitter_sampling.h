@@ -2,6 +2,7 @@
 // for sixteen side by side with the same operations and hence the same bits.
 #pragma once
 
+#include "base/look_up.h"
 #include "base/simd.h"
 #include "render/prepared_scene.h"
 #include "render/surface.h"
@@ -36,6 +37,20 @@ struct EmitterChoices {
 };
 EmitterChoices choose_emitters(const PreparedScene &scene, const FloatPacket &x);
 
+// The same of a scene with few_points.
+inline EmitterChoices choose_few_points(const PreparedScene &scene, const FloatPacket &x) {
+    const uint32_t count = uint32_t(scene.data.emitters.size());
+    UIntPacket emitter(0u);
+    if (count > 1 && !scene.emitter_choice.empty()) {
+        emitter = scene.emitter_choice.index_of(x);
+    } else if (count > 1) {
+        // Truncated, as conversion to an integer does; x < 1 may round up to the count.
+        emitter = UIntPacket(minimum(FloatPacket(UIntPacket(x * FloatPacket(float(count)))),
+                                     FloatPacket(float(count - 1))));
+    }
+    return {emitter, look_up(scene.few_points->choice_weights, emitter), x};
+}
+
 // `density`, if given, is set where there is light: per solid angle at p, the choice of the
 // emitter included; infinity for light that comes from one direction.
 EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t emitter,
@@ -48,6 +63,13 @@ EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t em
 EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 const EmitterChoices &choices,
                                                 LaneBits lanes, const Vec3<FloatPacket> &p);
+
+// Of an emitter that is a rectangle. Mitsuba's rectangle.cpp, sample_position.
+template <typename Real>
+Vec3<Real> point_on_rectangle(const Emitter &emitter, const Real &x, const Real &y) {
+    return Vec3<Real>(emitter.corner) + x * Vec3<Real>(emitter.edge_u) +
+           y * Vec3<Real>(emitter.edge_v);
+}
 
 // Whether the numbers x and y make a difference.
 bool needs_light_numbers(const PreparedScene &scene);

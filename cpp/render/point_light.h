@@ -55,6 +55,12 @@ inline void set_light(FewPointLights &lights, uint32_t number,
                     [&](LaneArray<float> &entries, float one) { entries[number] = one; });
 }
 
+// The lights of a scene that has no others, and 1 / the probability that each is chosen.
+struct FewPoints {
+    FewPointLights lights;
+    LaneArray<float> choice_weights;
+};
+
 inline PointLight<FloatPacket> lights_of(const FewPointLights &lights,
                                          const UIntPacket &numbers) {
     PointLight<FloatPacket> chosen;

@@ -146,6 +146,18 @@ EmitterTable prepare_emitter(const PreparedScene &prepared, const Emitter &emitt
     return table;
 }
 
+FewPoints find_few_points(const PreparedScene &scene) {
+    const uint32_t count = uint32_t(scene.emitter_tables.size());
+    FewPoints points{};
+    for (uint32_t i = 0; i < count; ++i) {
+        set_light(points.lights, i, scene.emitter_tables[i].point);
+        points.choice_weights[i] = scene.emitter_choice.empty() || count == 1
+                                       ? float(count)
+                                       : 1.0f / scene.emitter_choice.probability(i);
+    }
+    return points;
+}
+
 } // namespace
 
 PreparedScene::PreparedScene(SceneData scene_data)
@@ -174,13 +186,10 @@ PreparedScene::PreparedScene(SceneData scene_data)
                                    emitter.type == EmitterType::spot ||
                                    emitter.sampling_weight == 0;
     }
-    if (all_emitters_are_points && emitter_tables.size() <= PACKET_WIDTH) {
-        few_points.emplace();
-        for (uint32_t i = 0; i < emitter_tables.size(); ++i)
-            set_light(*few_points, i, emitter_tables[i].point);
-    }
     if (std::any_of(weights.begin(), weights.end(), [](float w) { return w != 1.0f; }))
         emitter_choice = Distribution(weights);
+    if (all_emitters_are_points && emitter_tables.size() <= PACKET_WIDTH)
+        few_points = find_few_points(*this);
 
     if (!bounds.empty()) {
         center = (bounds.lo + bounds.hi) * 0.5f;

@@ -39,7 +39,7 @@ struct PreparedScene {
     FaceRange glowing_faces, textured_faces;  // the latter by their materials
     bool all_emitters_are_points = true;      // or spots, of those that are ever chosen
     std::vector<EmitterTable> emitter_tables; // one an emitter
-    std::optional<FewPointLights> few_points; // if all are, and at most sixteen
+    std::optional<FewPoints> few_points;      // if all are, and at most sixteen
     Distribution emitter_choice;              // empty if all emitters are equally likely
     Environment environment;
     LazyGlowingFaces glowing; // asked for BSDF samples only

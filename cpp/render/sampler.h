@@ -3,11 +3,8 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cstddef>
 #include <cstdint>
-#include <span>
 #include <utility>
 
 namespace mlrt {
@@ -40,13 +37,6 @@ public:
         state_ = old * 0x5851f42d4c957f2dull + increment_;
         return std::rotr(uint32_t(((old >> 18) ^ old) >> 27), int(old >> 59));
     }
-
-    // All there is to it, to go on later.
-    struct State {
-        uint64_t state, increment;
-    };
-    State state() const { return {state_, increment_}; }
-    explicit Pcg32(State state) : state_(state.state), increment_(state.increment) {}
 
     // Uniform in [0, 1): 23 random bits as the mantissa of a number in [1, 2).
     float next_float() {
@@ -124,70 +114,5 @@ private:
 struct NumberPair {
     float *x = nullptr, *y = nullptr;
 };
-
-// The numbers of samples, pair by pair. Loops over samples have no branches, so compilers
-// make vector code of them; those for one and for two pairs keep generators in registers.
-inline void draw_numbers(const uint32_t *__restrict seeds,
-                         const uint32_t *__restrict indices, size_t count,
-                         std::span<const NumberPair> pairs) {
-    const auto open = [&](size_t i) {
-        return SampleStreams::Stream{seeds[i], indices[i]}.open();
-    };
-    if (pairs.size() == 1) {
-        float *__restrict x = pairs[0].x, *__restrict y = pairs[0].y;
-        for (size_t i = 0; i < count; ++i) {
-            Pcg32 random = open(i);
-            x[i] = random.next_float();
-            y[i] = random.next_float();
-        }
-        return;
-    }
-    if (pairs.size() == 2 && !pairs[1].y && pairs[1].x) {
-        float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
-        float *__restrict x1 = pairs[1].x;
-        for (size_t i = 0; i < count; ++i) {
-            Pcg32 random = open(i);
-            x0[i] = random.next_float();
-            y0[i] = random.next_float();
-            x1[i] = random.next_float();
-        }
-        return;
-    }
-    if (pairs.size() == 2 && pairs[1].y) {
-        float *__restrict x0 = pairs[0].x, *__restrict y0 = pairs[0].y;
-        float *__restrict x1 = pairs[1].x, *__restrict y1 = pairs[1].y;
-        for (size_t i = 0; i < count; ++i) {
-            Pcg32 random = open(i);
-            x0[i] = random.next_float();
-            y0[i] = random.next_float();
-            x1[i] = random.next_float();
-            y1[i] = random.next_float();
-        }
-        return;
-    }
-    constexpr size_t BLOCK = 256; // generators that are kept at a time; chosen
-    std::array<uint64_t, BLOCK> states, increments;
-    for (size_t begin = 0; begin < count; begin += BLOCK) {
-        const size_t size = std::min(BLOCK, count - begin);
-        for (size_t i = 0; i < size; ++i) {
-            const Pcg32::State opened = open(begin + i).state();
-            states[i] = opened.state;
-            increments[i] = opened.increment;
-        }
-        const auto draw = [&](float *__restrict numbers) {
-            for (size_t i = 0; i < size; ++i) {
-                Pcg32 random(Pcg32::State{states[i], increments[i]});
-                numbers[i] = random.next_float();
-                states[i] = random.state().state;
-            }
-        };
-        std::array<float, BLOCK> dropped;
-        for (const NumberPair &pair : pairs) {
-            draw(pair.x ? pair.x + begin : dropped.data());
-            if (pair.y)
-                draw(pair.y + begin);
-        }
-    }
-}
 
 } // namespace mlrt

@@ -5,18 +5,18 @@
 #include "base/counters.h"
 #include "base/simd.h"
 #include "mlrta/trace.h"
-#include "render/hit_packet.h"
 #include "render/prepared_scene.h"
+#include "render/reflected_light.h"
 #include "render/shadow_offset.h"
 
+#include <bit>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 namespace mlrt {
 
-// Light of one emitter that reaches points unless something is in the way.
+// Of one emitter, to the points that it lights unless something is in the way.
 //
 // For point and spot lights shadow rays start at the light, so that they share an origin
 // and form a beam; the interval leaves out the same share at the light's end as in Mitsuba,
@@ -30,25 +30,41 @@ public:
 
     void clear() { count_ = packet_count_ = 0; }
 
-    // Adds the lanes whose bit is set: `light` reaches the point `from`, which lies off its
-    // surface (see shadow_offset.h), from the point `to`. The hits tell which camera rays
-    // it is for.
-    void append(LaneBits lanes, const HitPacket &hit, const Vec3<FloatPacket> &from,
-                const Vec3<FloatPacket> &to, const Vec3<FloatPacket> &light);
+    // Adds the lanes whose bit is set, of a packet of reflected light: it is seen unless
+    // something lies between the point `from`, which lies off its surface (see
+    // shadow_offset.h), and the point `to`.
+    void append(LaneBits lanes, uint32_t packet, const Vec3<FloatPacket> &from,
+                const Vec3<FloatPacket> &to) {
+        reserve(count_ + PACKET_WIDTH);
+        packets_[packet_count_++] = {packet, lanes};
+        const uint32_t first = count_;
+        count_ += uint32_t(std::popcount(lanes));
+        for (int k = 0; k < 3; ++k) {
+            float *direction = direction_[k].data() + first;
+            if (from_light_) {
+                store_compressed(direction, from[k] - to[k], lanes);
+                continue;
+            }
+            store_compressed(&origin_[k][first], from[k], lanes);
+            store_compressed(direction,
+                             parallel_ ? FloatPacket((*parallel_)[k]) : to[k] - from[k],
+                             lanes);
+        }
+    }
 
-    // Adds the light that nothing occludes to colours[k][ray], in the order given, and what
-    // tracing takes to cost[ray] if `cost` is given.
+    // Shows the light that nothing occludes, and adds what tracing takes to cost[ray] of
+    // camera rays if `cost` is given.
     void trace(const SceneData &scene, const TraceOptions &options, Counters &counters,
-               float *cost, std::span<float *const, 3> colours);
+               float *cost, ReflectedLight &light);
 
 private:
-    void reserve(size_t size);
+    void reserve(size_t size) {
+        if (occluded_.size() < size)
+            grow(size);
+    }
+    void grow(size_t size);
     void find_occluded(const SceneData &scene, const TraceOptions &options,
-                       Counters &counters, float *cost);
-
-    struct Packet;
-    static void add_light(const Packet &packet, LaneBits visible, const uint32_t *rays,
-                          std::span<float *const, 3> colours);
+                       Counters &counters, float *cost, const ReflectedLight &light);
 
     bool from_light_;
     Vec3f light_position_;
@@ -56,15 +72,13 @@ private:
     float begin_, end_;             // of their intervals
     uint32_t count_ = 0;
     // One array a component, with room for a packet behind the last entry.
-    AlignedVector<uint32_t> ray_;
     AlignedVector<float> origin_[3]; // if the rays do not start at the light
     AlignedVector<float> direction_[3];
     AlignedVector<float> cost_;
     AlignedVector<uint8_t> occluded_;
-    // What was added at once: the lanes have light, and neighbouring entries above.
+    // What was added at once: neighbouring entries above, one a lane.
     struct Packet {
-        Vec3<FloatPacket> light;     // any value in other lanes
-        std::optional<size_t> first; // camera ray in lane 0, if the others follow it
+        uint32_t number; // of reflected light
         LaneBits lanes;
     };
     uint32_t packet_count_ = 0;

@@ -38,6 +38,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
         factors_.push_back(std::numbers::inv_pi_v<float> / shared_by);
         factors_differ_ |= factors_.back() != factors_.front();
     }
+    plain_ = shades_plainly();
     if (bsdf_samples_ > 0)
         bsdf_rays_.emplace(scene, shares_);
     for (ShadedPacket &packet : packets_)
@@ -69,6 +70,7 @@ void TileRenderer::make_room() {
         channel.assign(padded, 0.0f);
     if (target_.cost)
         cost_.assign(padded, 0.0f);
+    reflected_.clear();
     for (ShadowRays &shadow : shadows_)
         shadow.clear();
     if (bsdf_rays_)
@@ -123,9 +125,7 @@ void TileRenderer::add_background() {
             continue;
         const auto mask = from_bits<FloatPacket>(misses);
         const Vec3<FloatPacket> light =
-            scene_.environment.radiance({load<FloatPacket>(samples_.direction(0) + first),
-                                         load<FloatPacket>(samples_.direction(1) + first),
-                                         load<FloatPacket>(samples_.direction(2) + first)});
+            scene_.environment.radiance(samples_.directions(first));
         for (int k = 0; k < 3; ++k)
             store(&values_[size_t(k)][first], select(mask, light[k], FloatPacket(0.0f)));
     }
@@ -135,21 +135,22 @@ void TileRenderer::add_background() {
 // that wait for each other, of which a processor works on several only if they are short.
 void TileRenderer::shade_hits() {
     const bool common_origin = scene_.plane.has_common_origin();
-    const size_t at_once = packets_.size() * PACKET_WIDTH;
+    const size_t at_once = AT_ONCE * PACKET_WIDTH;
     for (size_t begin = 0; begin < samples_.count(); begin += at_once) {
         const size_t end = std::min(begin + at_once, samples_.count());
         size_t count = 0;
         for (size_t first = begin; first < end; first += PACKET_WIDTH) {
+            const auto faces = load<UIntPacket>(&primitive_[first]);
+            const LaneBits hits = to_bits(faces != UIntPacket(NO_PRIMITIVE));
+            if (hits == 0 || (plain_ && find_plain_packet(first, faces, hits)))
+                continue;
             ShadedPacket &packet = packets_[count];
             HitPacket &hit = packet.hit;
-            hit.faces = load<UIntPacket>(&primitive_[first]);
-            hit.lanes = to_bits(hit.faces != UIntPacket(NO_PRIMITIVE));
-            if (hit.lanes == 0)
-                continue;
+            hit.faces = faces;
+            hit.lanes = hits;
             ++count;
             hit.ray = UIntPacket(uint32_t(first)) + lane_indices();
-            for (int k = 0; k < 3; ++k)
-                hit.direction[k] = load<FloatPacket>(samples_.direction(k) + first);
+            hit.direction = samples_.directions(first);
             for (int k = 0; k < 3 && !common_origin; ++k)
                 hit.origin[k] = load<FloatPacket>(samples_.origin(k) + first);
             hit.first = first;
@@ -161,6 +162,7 @@ void TileRenderer::shade_hits() {
             new (&packet.point)
                 SurfacePoint<FloatPacket>(surface_of(scene_, faces_, hit, common_origin));
         }
+        shade_plain_packets();
         const std::span packets = std::span(packets_).first(count);
         for (const ShadedPacket &packet : packets)
             write_depth_and_normal(packet.hit, packet.point, *packet.hit.first);
@@ -234,7 +236,8 @@ void TileRenderer::add_reflected_light() {
                                          values_[2].data()};
     for (ShadowRays &shadow : shadows_)
         shadow.trace(scene_.data, shadow.from_light() ? options_.together : options_.alone,
-                     counters_.shadow, cost, colours);
+                     counters_.shadow, cost, reflected_);
+    reflected_.add_to(colours);
     if (bsdf_rays_)
         bsdf_rays_->trace(options_.alone, counters_.bsdf, cost, colours);
 }

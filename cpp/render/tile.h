@@ -14,6 +14,7 @@
 #include "render/picture_film.h"
 #include "render/pixel_group.h"
 #include "render/prepared_scene.h"
+#include "render/reflected_light.h"
 #include "render/sampler.h"
 #include "render/shadow.h"
 #include "render/shadow_offset.h"
@@ -92,6 +93,19 @@ struct ShadedPacket {
     EmitterSample<FloatPacket> light;
 };
 
+// The same of rays that all meet one side of one face, which is of one colour.
+struct PlainPacket {
+    size_t first;   // ray in lane 0
+    LaneBits lanes; // that reflect light
+    bool front;     // whether they see the front
+    Vec3f colour, face_normal;
+    Vec3<FloatPacket> p, shading_normal;
+    UIntPacket emitters;             // that are chosen
+    Vec3<FloatPacket> start, target; // of shadow rays
+    LaneBits lit;
+    uint32_t number; // of reflected light
+};
+
 class TileRenderer {
 public:
     TileRenderer(const PreparedScene &scene, const SampleStreams &streams,
@@ -133,6 +147,10 @@ private:
     FloatPacket factors_of(const UIntPacket &emitters, LaneBits lanes) const;
     void add_light(const ShadedPacket &packet, LaneBits lanes,
                    const EmitterSample<FloatPacket> &light, const UIntPacket &emitters);
+    // In plain_light.cpp.
+    bool shades_plainly() const;
+    bool find_plain_packet(size_t first, const UIntPacket &faces, LaneBits hits);
+    void shade_plain_packets();
     // In bsdf_light.cpp.
     void shade_in_both_ways(const HitPacket &hit, const SurfacePoint<FloatPacket> &point,
                             const UIntPacket &shapes, LaneBits lanes,
@@ -175,12 +193,17 @@ private:
     AlignedVector<float> cost_;                // if it is wanted
     std::vector<AlignedVector<float>> values_; // by channel of the film
 
+    ReflectedLight reflected_;
     std::vector<ShadowRays> shadows_; // one an emitter
     SampleShares shares_;
     uint32_t bsdf_samples_;
     std::optional<BsdfRays> bsdf_rays_; // if there are BSDF samples
     PassingRays passing_;
-    std::array<ShadedPacket, 4> packets_; // that are shaded at once; as many are chosen
+    static constexpr size_t AT_ONCE = 4; // packets that are shaded at once; chosen
+    std::array<ShadedPacket, AT_ONCE> packets_;
+    bool plain_ = false; // whether packets may be shaded plainly
+    std::array<PlainPacket, AT_ONCE> plain_packets_;
+    size_t plain_count_ = 0;
 };
 
 } // namespace mlrt

@@ -41,6 +41,26 @@ def test_against_scalar_pcg32_and_tea(seed: int, samples: int) -> None:
     )
 
 
+@pytest.mark.parametrize("drawn", [[2], [2, 1], [2, 0, 2], [0, 1, 2, 2, 2, 1]], ids=str)
+def test_packets_against_scalar_pcg32(drawn: list[int]) -> None:
+    random = np.random.default_rng(3)
+    seeds, indices = random.integers(0, 1 << 32, (2, 16), dtype=np.uint64).tolist()
+    seeds[:2], indices[:2] = [0, 0xFFFFFFFF], [0xFFFFFFFF, 0]
+    expected = []
+    for seed, index in zip(seeds, indices, strict=True):
+        stream = mi.PCG32(1, *mi.sample_tea_32(seed, index))
+        numbers = []
+        for count in drawn:
+            first = stream.next_float32()
+            numbers += [first] if count == 1 else []
+            numbers += [first, stream.next_float32()] if count == 2 else []
+        expected.append(numbers)
+    np.testing.assert_array_equal(
+        np.array(core.render_selftest.packet_streams(seeds, indices, drawn), np.float32),
+        np.array(expected, np.float32),
+    )
+
+
 @pytest.mark.parametrize(("seed", "samples"), [(0, 1), (123, 5)])
 def test_against_the_sampler_itself(
     mitsuba_llvm: MitsubaWorker, seed: int, samples: int
