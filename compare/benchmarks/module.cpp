@@ -317,6 +317,7 @@ NB_MODULE(MLRT_MODULE, m) {
     using namespace mlrt::bench;
     m.attr("isa") = MLRT_ISA_NAME;
     m.attr("exact") = mlrt::EXACT;
+    m.attr("exact_distances") = mlrt::EXACT_DISTANCES;
     m.def(
         "release_memory", [] { malloc_trim(0); },
         "Returns freed memory to the system, so that the next piece of work starts as in "

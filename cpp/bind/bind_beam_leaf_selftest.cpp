@@ -233,6 +233,7 @@ nb::dict forms_of(const BeamUnderTest &self, const Rows &vertices) {
                                      lanes_of(forms.of_v[form])));
     dict["forms"] = values;
     dict["edge_error"] = lanes_of(forms.edge_error);
+    dict["ray_error"] = lanes_of(forms.ray_error);
     dict["depth_error"] = lanes_of(forms.depth_error);
     dict["depth_shrink"] = lanes_of(forms.depth_shrink);
     dict["depth_grow"] = lanes_of(forms.depth_grow);

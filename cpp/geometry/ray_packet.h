@@ -151,6 +151,21 @@ auto plane_numerator(const RayPacket<Origin> &rays, const TrianglePlane &plane,
     }
 }
 
+// As single precision has them.
+template <typename Origin>
+FloatPacket distances_inexactly(const RayPacket<Origin> &rays, const Triangle &triangle) {
+    const auto to_vertex = [&] {
+        if constexpr (std::is_same_v<Origin, CommonOrigin>)
+            return triangle.a - rays.origin.point;
+        else
+            return in_all_lanes(triangle.a) - rays.origin.point;
+    }();
+    const Vec3f normal = cross(triangle.b - triangle.a, triangle.c - triangle.a);
+    return (to_vertex.x * normal.x + to_vertex.y * normal.y + to_vertex.z * normal.z) /
+           (rays.direction.x * normal.x + rays.direction.y * normal.y +
+            rays.direction.z * normal.z);
+}
+
 // What intersect() is where hits are not exact: the signs of the volumes and the distance
 // as single precision has them.
 template <typename Origin>
@@ -171,12 +186,8 @@ PacketCandidates intersect_inexactly(const RayPacket<Origin> &rays, LaneBits lan
     PacketCandidates result;
     result.hit = lanes & to_bits((minimum(u, minimum(v, w)) >= 0.0f) |
                                  (maximum(u, maximum(v, w)) <= 0.0f));
-    if (result.hit == 0)
-        return result;
-    const Vec3f normal = cross(triangle.b - triangle.a, triangle.c - triangle.a);
-    result.t = (a.x * normal.x + a.y * normal.y + a.z * normal.z) /
-               (rays.direction.x * normal.x + rays.direction.y * normal.y +
-                rays.direction.z * normal.z);
+    if (result.hit != 0)
+        result.t = distances_inexactly(rays, triangle);
     return result;
 }
 
@@ -202,6 +213,10 @@ PacketCandidates intersect(const RayPacket<Origin> &rays, LaneBits lanes,
     });
     if (result.hit == 0)
         return result;
+    if constexpr (!EXACT_DISTANCES) {
+        result.t = distances_inexactly(rays, triangle);
+        return result;
+    }
 
     const TrianglePlane plane(triangle);
     const Vec3<DoublePacket> direction = to_double(rays.direction);

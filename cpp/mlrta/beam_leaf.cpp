@@ -236,8 +236,10 @@ bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &f
             take_through(BeamWalk<query>(tree, beam, tests, counters));
         }
     }
-    std::ranges::copy(tests.hit(), memory.occluders.begin());
-    memory.occluder_count = uint32_t(tests.hit().size());
+    const std::span<const uint32_t> hit = tests.hit();
+    std::ranges::copy(hit,
+                      query == Query::any ? memory.occluders.begin() : memory.hit.begin());
+    (query == Query::any ? memory.occluder_count : memory.hit_count) = uint32_t(hit.size());
     return done;
 }
 

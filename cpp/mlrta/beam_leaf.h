@@ -31,6 +31,11 @@ struct BeamMemory {
     // those of the next one too, and tested first.
     std::array<uint32_t, WIDE_WIDTH> occluders;
     uint32_t occluder_count = 0;
+
+    // Triangles of which rays of the last beam, of Query::closest, took one as the nearest
+    // for some time; or as many of them as there is room for, which are nearly always all.
+    std::array<uint32_t, HitDistances::MOST_PREPARED> hit;
+    uint32_t hit_count = 0;
 };
 
 // Finds for the active rays of a beam what they hit in the subtrees of a frontier: the

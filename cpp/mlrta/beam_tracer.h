@@ -139,6 +139,9 @@ private:
             for (uint32_t n = 0; n < beam.count; ++n)
                 cost.add_to_lanes(beam.lanes[n].first_ray, beam.lanes[n].active, share);
         counters_.fallbacks += !done;
+        if constexpr (Output::query == Query::closest && EXACT_DISTANCES)
+            if (done && output_.wants_distances())
+                memory_.distances.prepare({memory_.hit.data(), memory_.hit_count});
         for (uint32_t n = 0; n < beam.count; ++n)
             finish(n, done, frontier);
         if (beam.any_stray)
@@ -202,7 +205,7 @@ private:
 
     FloatPacket distances_of(uint32_t number) {
         const PacketLanes &packet = beam_.lanes[number];
-        if constexpr (EXACT)
+        if constexpr (EXACT_DISTANCES)
             return memory_.distances.of(rays_, packet.first_ray, packet.found,
                                         beam_.packets[number].primitive, counters_);
         // Reciprocal depths are all that single precision needs.

@@ -1,7 +1,7 @@
 #include "mlrta/beam_triangle_tests.h"
 
 #include "base/exactness.h"
-#include "geometry/one_plane.h"
+#include "geometry/coplanar.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/block_pairs.h"
 #include "traverse/load_packet.h"
@@ -27,13 +27,6 @@ Vec3f direction_of(const RayGroup &rays, uint32_t i) {
     return {rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]};
 }
 
-FloatPacket value_of(const TriangleForms &forms, int form, uint32_t lane,
-                     const BeamPacket &packet) {
-    return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
-                 fused(packet.v, FloatPacket(forms.of_v[form][lane]),
-                       FloatPacket(forms.constant[form][lane])));
-}
-
 } // namespace
 
 template <Query query>
@@ -45,10 +38,9 @@ void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) 
     flush();
 }
 
-// The first leaves' triangles are tested at once, as they may stop all rays. A beam that
-// goes on visits many leaves, and their triangles wait till a block is full. Where it meets
-// many, they wait until those of the next leaves have been fetched as well: the memory has
-// time to bring them.
+// The first leaves' triangles are tested at once, as they may stop all rays. Those of a beam
+// that goes on wait till a block is full, and where it meets many, until those of the next
+// leaves have been fetched as well: the memory has time to bring them.
 template <Query query>
 void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
     const bool fills = blocks_ >= BLOCKS_AT_ONCE;
@@ -97,8 +89,6 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         grid_.fill(beam_);
         dense_ = true;
     }
-    // All pairs of runs and triangles first, then all of packets and triangles, so that
-    // loops are long and their ends easy to foresee.
     const LaneBits possible =
         dense_ ? grid_.may_hit(forms, forms.possible) : forms.possible;
     const bool one_run = beam_.run_count() == 1;
@@ -111,6 +101,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
             of_large.add(n, triangles & large);
         of_small.add(n, triangles & ~large);
     }
+    LaneBits hit = 0;
     uint32_t pairs = 0;
     BeamPackets::Packets in_pairs;
     const auto add_pairs = [&](uint32_t first, LaneBits packets) {
@@ -127,6 +118,7 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
         if (coverage.covered != 0) {
             cover(n, coverage, forms, lane, numbers[lane]);
             any_covered = true;
+            hit |= LaneBits(1) << lane;
         }
         add_pairs(first, packets);
     }
@@ -138,22 +130,19 @@ void BeamTriangleTests<query>::test_block(const uint32_t *numbers, uint32_t coun
     if constexpr (query == Query::closest)
         for (uint32_t n = 0; n < beam_.run_count(); ++n)
             beam_.settle(rays_, n, in_pairs.run(n));
-    pairs = packets_inside(forms, pairs);
     BeamPackets::Packets changed;
     bool any_changed = false;
-    LaneBits hit = 0;
     for (uint32_t i = 0; i < pairs; ++i) {
         const uint32_t n = packet_of_pair(pairs_[i]), lane = lane_of_pair(pairs_[i]);
-        const LaneBits found = test_packet(n, forms, lane, numbers[lane], sides_[i]);
+        const LaneBits found = test_packet(n, forms, lane, numbers[lane]);
         changed.run(n / PACKET_WIDTH) |= found << n % PACKET_WIDTH;
         hit |= found << lane;
         any_changed |= found != 0;
     }
-    if constexpr (query == Query::any)
-        for_each_lane(hit, [&](uint32_t lane) {
-            if (hit_count_ < hit_.size())
-                hit_[hit_count_++] = numbers[lane];
-        });
+    for_each_lane(hit, [&](uint32_t lane) {
+        if (hit_count_ < hit_.size())
+            hit_[hit_count_++] = numbers[lane];
+    });
     if (any_changed)
         update_least(changed);
     else if (any_covered)
@@ -182,83 +171,99 @@ void BeamTriangleTests<query>::cover(uint32_t number,
                                    forms.constant[DEPTH][lane],
                                    forms.of_u[DEPTH][lane],
                                    forms.of_v[DEPTH][lane],
-                                   EXACT ? forms.depth_shrink[lane] : 1.0f,
-                                   EXACT ? forms.depth_grow[lane] : 1.0f,
-                                   EXACT ? forms.depth_error[lane] : 0.0f};
+                                   EXACT_DISTANCES ? forms.depth_shrink[lane] : 1.0f,
+                                   EXACT_DISTANCES ? forms.depth_grow[lane] : 1.0f,
+                                   EXACT_DISTANCES ? forms.depth_error[lane] : 0.0f};
     for_each_lane(coverage.covered, [&](uint32_t i) { beam_.covers[first + i] = cover; });
 }
 
-// Keeps those of the pairs in which rays may pass within the triangle's edges: most of
-// small triangles lie between rays. Without a branch, as nobody foresees which. Returns how
-// many are kept.
+// A triangle as sixteen rays see it.
 template <Query query>
-uint32_t BeamTriangleTests<query>::packets_inside(const TriangleForms &forms,
-                                                  uint32_t pairs) {
-    uint32_t kept = 0;
-    for (uint32_t i = 0; i < pairs; ++i) {
-        const uint32_t pair = pairs_[i], lane = lane_of_pair(pair);
-        const BeamPacket &packet = beam_.packets[packet_of_pair(pair)];
-        const auto value = [&](int form) { return value_of(forms, form, lane, packet); };
-        const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
-        const FloatPacket error(EXACT ? forms.edge_error[lane] : 0.0f);
-        const LaneBits possible = to_bits(smallest + error >= 0.0f);
-        const LaneBits certain = EXACT ? to_bits(smallest > error) : possible;
-        pairs_[kept] = pair;
-        sides_[kept] = {uint16_t(possible), uint16_t(certain)};
-        kept += possible != 0;
-    }
-    return kept;
-}
-
-// One triangle against sixteen rays. Returns whether they found something.
-template <Query query>
-bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
-                                           uint32_t lane, uint32_t primitive,
-                                           EdgeSides sides) {
-    BeamPacket &packet = beam_.packets[number];
-    const FloatPacket depth = value_of(forms, TriangleForms::DEPTH, lane, packet);
+auto BeamTriangleTests<query>::see(uint32_t number, const TriangleForms &forms,
+                                   uint32_t lane) const -> Seen {
+    const BeamPacket &packet = beam_.packets[number];
+    const auto value = [&](int form) {
+        return fused(packet.u, FloatPacket(forms.of_u[form][lane]),
+                     fused(packet.v, FloatPacket(forms.of_v[form][lane]),
+                           FloatPacket(forms.constant[form][lane])));
+    };
+    const FloatPacket depth = value(TriangleForms::DEPTH);
     const FloatPacket error(forms.depth_error[lane]);
-    const FloatPacket highest =
-        EXACT ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
-    const FloatPacket lowest =
-        EXACT ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error) : depth;
-    LaneBits possible = sides.possible & to_bits(highest >= packet.least);
+    const FloatPacket edge_error(EXACT ? forms.ray_error[lane] : 0.0f);
+    Seen seen;
+    seen.highest =
+        EXACT_DISTANCES ? fused(depth, FloatPacket(forms.depth_grow[lane]), error) : depth;
+    seen.lowest = EXACT_DISTANCES
+                      ? fused(depth, FloatPacket(forms.depth_shrink[lane]), -error)
+                      : depth;
+    const FloatPacket smallest = minimum(value(0), minimum(value(1), value(2)));
+    seen.possible = (seen.highest >= packet.least) & (smallest >= -edge_error);
     FloatPacket begin(beam_.nearest);
     if (query == Query::any && beam_.parallel) {
         begin = beam_.begins[number].least;
-        possible &= to_bits(lowest <= beam_.begins[number].greatest);
+        seen.possible &= seen.lowest <= beam_.begins[number].greatest;
     }
-    const LaneBits found =
-        possible & sides.certain & to_bits((lowest > packet.greatest) & (highest < begin));
-    const auto nearer = from_bits<FloatPacket>(found);
-    beam_.lanes[number].found |= found;
-    if constexpr (query == Query::any) {
-        packet.least = select(nearer, FloatPacket(INFINITE), packet.least);
-    } else {
-        packet.least = select(nearer, lowest, packet.least);
-        packet.greatest = select(nearer, highest, packet.greatest);
-        packet.primitive =
-            select(MaskOf<UIntPacket>(nearer), UIntPacket(primitive), packet.primitive);
-    }
-    const LaneBits open = EXACT ? possible & ~found : 0;
-    if (open != 0) [[unlikely]]
-        decide(number, open, sides.certain, primitive);
-    return (found | open) != 0;
+    seen.certain = EXACT ? smallest > edge_error : smallest >= edge_error;
+    seen.nearer = (seen.lowest > packet.greatest) & (seen.highest < begin);
+    return seen;
 }
 
-// By the contract of geometry/triangle_test.h.
+// One triangle against sixteen rays. Returns whether they found something. Without a frame
+// of the stack, since what is seldom needed is called at the end.
 template <Query query>
-void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes,
-                                      LaneBits certain_hits, uint32_t primitive) {
+bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
+                                           uint32_t lane, uint32_t primitive) {
+    const Seen seen = see(number, forms, lane);
+    const LaneBits found = to_bits(seen.possible & seen.certain & seen.nearer);
+    take(number, found, seen.lowest, seen.highest, primitive);
+    const LaneBits open = EXACT ? to_bits(seen.possible) & ~found : 0;
+    if (open != 0) [[unlikely]]
+        return decide_open(number, forms, lane, primitive, open);
+    return found != 0;
+}
+
+// Rays of which test_packet() leaves it open whether they find something.
+template <Query query>
+[[gnu::noinline]] bool
+BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &forms,
+                                      uint32_t lane, uint32_t primitive, LaneBits open) {
+    decide(number, open, see(number, forms, lane), primitive);
+    return true;
+}
+
+// Hits of a triangle at depths that have these bounds.
+template <Query query>
+void BeamTriangleTests<query>::take(uint32_t number, LaneBits lanes,
+                                    const FloatPacket &lowest, const FloatPacket &highest,
+                                    uint32_t primitive) {
+    BeamPacket &packet = beam_.packets[number];
+    beam_.lanes[number].found |= lanes;
+    const auto mask = from_bits<FloatPacket>(lanes);
+    if constexpr (query == Query::any) {
+        packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+    } else {
+        packet.least = select(mask, lowest, packet.least);
+        packet.greatest = select(mask, highest, packet.greatest);
+        packet.primitive =
+            select(MaskOf<UIntPacket>(mask), UIntPacket(primitive), packet.primitive);
+    }
+}
+
+// By the contract of geometry/triangle_test.h. Where a depth certainly is the nearest, only
+// whether the ray hits is decided.
+template <Query query>
+void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const Seen &seen,
+                                      uint32_t primitive) {
+    const LaneBits certain_hits = to_bits(seen.certain), nearest = to_bits(seen.nearer);
     if (query == Query::any && beam_.parallel) {
         decide_parallel(number, lanes, certain_hits, primitive);
         return;
     }
     BeamPacket &packet = beam_.packets[number];
-    PacketLanes &of_rays = beam_.lanes[number];
+    const PacketLanes &of_rays = beam_.lanes[number];
     // In one plane a ray has one distance, and the lower number wins.
     LaneBits tied = 0;
-    for_each_value(packet.primitive, lanes & of_rays.found,
+    for_each_value(packet.primitive, lanes & of_rays.found & ~nearest,
                    [&](uint32_t rival, LaneBits holders) {
                        if (rival != primitive && !in_one_plane(tree_.triangles[rival],
                                                                tree_.triangles[primitive]))
@@ -277,6 +282,8 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes,
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
+    take(number, hits & nearest, seen.lowest, seen.highest, primitive);
+    hits &= ~nearest;
     const UIntPacket challenger(primitive);
     tied &= hits;
     packet.primitive = select(from_bits<UIntPacket>(tied), challenger, packet.primitive);
@@ -302,11 +309,8 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes,
     if (hits == 0)
         return;
 
-    of_rays.found |= hits;
-    const auto mask = from_bits<FloatPacket>(hits);
-    packet.primitive = select(from_bits<UIntPacket>(hits), challenger, packet.primitive);
     if constexpr (query == Query::any) {
-        packet.least = select(mask, FloatPacket(INFINITE), packet.least);
+        take(number, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
         return;
     }
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
@@ -315,11 +319,9 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes,
         load_padded(rays_.direction[beam_.axes[2]], of_rays.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
-    packet.least =
-        select(mask, minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
-               packet.least);
-    packet.greatest =
-        select(mask, FloatPacket((1 + 0x1p-21) / (distance * main)), packet.greatest);
+    take(number, hits,
+         minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
+         FloatPacket((1 + 0x1p-21) / (distance * main)), primitive);
 }
 
 // The same for rays that each have an origin, of Query::any.
@@ -355,7 +357,7 @@ void BeamTriangleTests<query>::test_unsafe(uint32_t primitive) {
         beam_.settle(rays_, n, ALL_LANES);
     for (uint32_t n = 0; n < beam_.count; ++n) {
         const LaneBits searching = to_bits(beam_.packets[n].least < INFINITE);
-        decide(n, beam_.lanes[n].active & searching, 0, primitive);
+        decide(n, beam_.lanes[n].active & searching, {}, primitive);
     }
     counters_.triangle_tests += beam_.count;
     update_least(BeamPackets::Packets::of_first(beam_.count));

@@ -45,23 +45,31 @@ public:
     bool all_done() const { return least_ == INFINITY; }
     // Whether the beam had better be given up.
     bool spent() const { return budget_.spent(); }
-    // Triangles that rays were found to hit, at most WIDE_WIDTH of them.
+    // Triangles that rays were found to hit, MOST_HIT of them at most: of Query::closest
+    // those that were the nearest for some time.
+    static constexpr uint32_t MOST_HIT =
+        query == Query::any ? WIDE_WIDTH : HitDistances::MOST_PREPARED;
     std::span<const uint32_t> hit() const { return {hit_.data(), hit_count_}; }
 
 private:
-    // Rays of a packet that may pass within the edges of a triangle, and that certainly do.
-    struct EdgeSides {
-        uint16_t possible, certain;
-    };
-
     void test_block(const uint32_t *numbers, uint32_t count);
     void cover(uint32_t run, const TriangleForms::Coverage &coverage,
                const TriangleForms &forms, uint32_t lane, uint32_t primitive);
-    uint32_t packets_inside(const TriangleForms &forms, uint32_t pairs);
     bool test_packet(uint32_t packet, const TriangleForms &forms, uint32_t lane,
-                     uint32_t primitive, EdgeSides sides);
+                     uint32_t primitive);
     void test_unsafe(uint32_t primitive);
-    void decide(uint32_t packet, LaneBits lanes, LaneBits certain_hits, uint32_t primitive);
+    // Rays that may hit a triangle nearer than all else; of those the ones that hit it for
+    // certain if it is ahead, and the ones that have found nothing as near if they hit it.
+    struct Seen {
+        MaskOf<FloatPacket> possible = false, certain = false, nearer = false;
+        FloatPacket lowest = 0.0f, highest = 0.0f; // bounds of its reciprocal depths
+    };
+    Seen see(uint32_t packet, const TriangleForms &forms, uint32_t lane) const;
+    bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
+                     uint32_t primitive, LaneBits open);
+    void decide(uint32_t packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
+    void take(uint32_t packet, LaneBits lanes, const FloatPacket &lowest,
+              const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(uint32_t packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
     void update_least(const BeamPackets::Packets &packets);
@@ -80,10 +88,9 @@ private:
     // Packets of the beam that triangles of a block may touch; see block_pairs.h. What is
     // written there comes in whole packets.
     std::array<uint32_t, WIDE_WIDTH * BeamPackets::CAPACITY + PACKET_WIDTH> pairs_;
-    std::array<EdgeSides, WIDE_WIDTH * BeamPackets::CAPACITY> sides_;
     std::array<uint32_t, 3 * WIDE_WIDTH> waiting_;
     uint32_t waiting_count_ = 0;
-    std::array<uint32_t, WIDE_WIDTH> hit_;
+    std::array<uint32_t, MOST_HIT> hit_;
     uint32_t hit_count_ = 0;
     float least_ = 0; // of all rays
     float far_end_ = 0;

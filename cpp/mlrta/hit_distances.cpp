@@ -4,10 +4,12 @@
 #include "base/exactness.h"
 #include "base/fused_difference.h"
 #include "base/magnitude.h"
-#include "base/point_doubles.h"
 #include "base/reciprocal_estimate.h"
+#include "base/transpose.h"
+#include "geometry/triangle_block.h"
 #include "traverse/load_packet.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -50,45 +52,73 @@ Vec3<FloatPacket> directions_of(const RayGroup &rays, uint32_t first_ray) {
 
 // With N and D exact, n and d as computed, |N - n| <= e_n and |D - d| <= e_d <= |d| / 2,
 //     |N/D - n/d| <= 2 |n/d| (e_n / |n| + e_d / |d|),
-// see PlaneDistance. Where e_d is larger that bound exceeds |n/d|, and is of no use. Tiny
-// errors must not be rounded to zero.
-HitDistances::Plane::Plane(uint32_t number, const Triangle &triangle, Vec3f origin)
-    : primitive(number) {
-    const PointDoubles a = point_doubles(&triangle.a.x), b = point_doubles(&triangle.b.x);
-    const PointDoubles c = point_doubles_behind(&triangle.b.z);
-    const PointDoubles to_vertex = a - PointDoubles(origin.x, origin.y, origin.z, 0.0);
-    const CrossTerms terms(b - a, c - a);
-    const PointDoubles n = terms.plus - terms.minus;
-    const PointDoubles magnitude = absolute(terms.plus) + absolute(terms.minus);
-    const double inverse = 1 / sum_of_components(n * to_vertex);
-    const double size = std::abs(inverse);
-    const PointDoubles scaled = n * PointDoubles(inverse);
-    const PointPacket high(scaled);
-    store(normal, high);
-    store(rest, PointPacket(scaled - PointDoubles(high)));
-    share = float((20 * DOUBLE_ROUNDOFF * ROUNDED_UP) *
-                  (sum_of_components(magnitude * absolute(to_vertex)) * size));
-    const double extent = sum_of_components(absolute(scaled));
-    const bool moderate = extent >= SMALLEST_NORMAL && extent <= LARGEST_NORMAL;
-    anchor = float(4 * ROUNDED_UP * extent);
-    direction_share =
-        moderate ? float(ROUNDED_UP *
-                         (ERROR * extent +
-                          (20 * DOUBLE_ROUNDOFF) * (sum_of_components(magnitude) * size)))
-                 : INFINITY;
+// see PlaneDistance. Where e_d is larger that bound exceeds |n/d|, and is of no use. The
+// share e_n / |n| is no more than that times the sum of absolute products of normal and d
+// by the size of normal.d. Tiny errors must not be rounded to zero.
+void HitDistances::put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitives) {
+    using Real = DoubleBlock;
+    const TriangleBlock<FloatBlock> block(tree_.triangles.data(), primitives.data());
+    const Vec3<Real> a = to_double(block.a);
+    const PlaneOf<Real> plane(a, to_double(block.b), to_double(block.c));
+    const Vec3d o(origin_);
+    const PlaneNumerator<Real> numerator(plane, {a.x - o.x, a.y - o.y, a.z - o.z});
+    const Real inverse = 1.0 / numerator.value, size = absolute(inverse);
+
+    constexpr size_t COLUMNS = 8; // as Planes has them
+    static_assert(sizeof(Plane) == COLUMNS * sizeof(float));
+    std::array<std::array<float, BLOCK_WIDTH>, COLUMNS> columns;
+    Real extent = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const Real scaled = plane.normal[k] * inverse;
+        extent = extent + absolute(scaled);
+        const FloatBlock normal(scaled);
+        store(columns[size_t(k)].data(), normal);
+        store(columns[size_t(4 + k)].data(), FloatBlock(scaled - Real(normal)));
+    }
+    store(columns[3].data(), FloatBlock(4 * ROUNDED_UP * extent));
+    const auto moderate = (extent >= SMALLEST_NORMAL) & (extent <= LARGEST_NORMAL);
+    const Real error = extent * (ERROR + 2.0 * (numerator.error * size)) +
+                       2.0 * (plane.denominator_error() * size);
+    store(columns[7].data(),
+          FloatBlock(select(moderate, ROUNDED_UP * error, Real(INFINITY))));
+
+    std::array<const float *, COLUMNS> rows;
+    for (size_t n = 0; n < COLUMNS; ++n)
+        rows[n] = columns[n].data();
+    const std::array<FloatBlock, BLOCK_WIDTH> by_plane = load_columns(rows);
+    for (size_t n = 0; n < BLOCK_WIDTH; ++n) {
+        store(reinterpret_cast<float *>(&planes_[primitives[n] % SIZE]), by_plane[n]);
+        known_[primitives[n] % SIZE] = primitives[n];
+    }
+}
+
+void HitDistances::prepare(std::span<const uint32_t> primitives) {
+    std::array<uint32_t, BLOCK_WIDTH> missing;
+    uint32_t count = 0;
+    for (const uint32_t primitive : primitives) {
+        missing[count] = primitive;
+        count += !knows(primitive);
+        if (count == BLOCK_WIDTH) {
+            put_planes(missing);
+            count = 0;
+        }
+    }
+    if (count == 0)
+        return;
+    std::fill(missing.begin() + count, missing.end(), missing[0]);
+    put_planes(missing);
 }
 
 const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
-    std::optional<Plane> &known = planes_[primitive % SIZE];
-    if (!known || known->primitive != primitive)
-        known.emplace(primitive, tree_.triangles[primitive], origin_);
-    return *known;
+    if (!knows(primitive)) [[unlikely]]
+        prepare({&primitive, 1});
+    return planes_[primitive % SIZE];
 }
 
 template <typename Value>
 HitDistances::Rounded HitDistances::rounded(const Vec3<FloatPacket> &d,
                                             const Planes<Value> &planes) {
-    if constexpr (!EXACT) {
+    if constexpr (!EXACT_DISTANCES) {
         const auto of = [&](int k) { return FloatPacket(planes.normal[k]); };
         return {1.0f / fused(d.x, of(0), fused(d.y, of(1), d.z * of(2))), ALL_LANES};
     }
@@ -110,16 +140,15 @@ HitDistances::Rounded HitDistances::rounded(const Vec3<FloatPacket> &d,
     const FloatPacket left =
         fused_difference(rest, about, fused_difference(sum, about, FloatPacket(1.0f)));
     const FloatPacket correction = about * fused(left, left, left);
-    const FloatPacket error =
-        fused(absolute(largest * about), FloatPacket(planes.direction_share),
-              FloatPacket(planes.share));
+    const FloatPacket error = absolute(largest * about) * FloatPacket(planes.error);
     // Both ends of the range; not equal if anything is not a number.
     const FloatPacket values = about + fused(about, error, correction);
     const FloatPacket others = about + fused_difference(about, error, correction);
     return {values, to_bits((values == others) & (error <= LARGEST_ERROR))};
 }
 
-// All that needs a frame of the stack is called at the end, so that this does without.
+// All that needs a frame of the stack is called at the end, with no more arguments than go
+// into registers, so that this does without.
 FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                              const UIntPacket &primitives, Counters &counters) {
     MLRT_CHECK(lanes != 0);
@@ -127,21 +156,21 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
     const uint32_t first = lane_of(primitives, uint32_t(std::countr_zero(lanes)));
     if ((lanes & to_bits(primitives != UIntPacket(first))) != 0)
         return of_several(rays, first_ray, lanes, primitives, counters);
-    const std::optional<Plane> &plane = planes_[first % SIZE];
-    if (!plane || plane->primitive != first)
-        return of_new(first, rays, first_ray, lanes, primitives, counters);
-    const Rounded distances = rounded<float>(directions_of(rays, first_ray), *plane);
+    if (!knows(first)) [[unlikely]]
+        return of_new(rays, first_ray, lanes, primitives, counters);
+    const Rounded distances =
+        rounded<float>(directions_of(rays, first_ray), planes_[first % SIZE]);
     const LaneBits open = lanes & ~distances.certain;
     if (open == 0) [[likely]]
         return distances.values;
     return with_ones(distances.values, rays, first_ray, open, primitives, counters);
 }
 
-[[gnu::noinline]] FloatPacket HitDistances::of_new(uint32_t primitive, const RayGroup &rays,
-                                                   uint32_t first_ray, LaneBits lanes,
+[[gnu::noinline]] FloatPacket HitDistances::of_new(const RayGroup &rays, uint32_t first_ray,
+                                                   LaneBits lanes,
                                                    const UIntPacket &primitives,
                                                    Counters &counters) {
-    plane_of(primitive);
+    plane_of(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
     return of(rays, first_ray, lanes, primitives, counters);
 }
 
@@ -150,20 +179,30 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
                                                        const UIntPacket &primitives,
                                                        Counters &counters) {
     Planes<FloatPacket> planes;
-    for_each_value(primitives, lanes, [&](uint32_t primitive, LaneBits holders) {
+    const auto put = [&](uint32_t primitive, LaneBits holders) {
         const Plane &plane = plane_of(primitive);
         const auto mask = from_bits<FloatPacket>(holders);
-        const auto put = [&](FloatPacket &values, float value) {
+        const auto put_value = [&](FloatPacket &values, float value) {
             values = select(mask, FloatPacket(value), values);
         };
         for (int k = 0; k < 3; ++k) {
-            put(planes.normal[k], plane.normal[k]);
-            put(planes.rest[k], plane.rest[k]);
+            put_value(planes.normal[k], plane.normal[k]);
+            put_value(planes.rest[k], plane.rest[k]);
         }
-        put(planes.anchor, plane.anchor);
-        put(planes.share, plane.share);
-        put(planes.direction_share, plane.direction_share);
-    });
+        put_value(planes.anchor, plane.anchor);
+        put_value(planes.error, plane.error);
+    };
+    // From both ends, since there are few triangles, and one takes long to be told from the
+    // next.
+    for (LaneBits left = lanes; left != 0;) {
+        const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
+        const uint32_t other = lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
+        const LaneBits of_one = to_bits(primitives == UIntPacket(one));
+        const LaneBits of_other = to_bits(primitives == UIntPacket(other));
+        put(one, of_one);
+        put(other, of_other);
+        left &= ~(of_one | of_other);
+    }
     const Rounded distances = rounded(directions_of(rays, first_ray), planes);
     const LaneBits open = lanes & ~distances.certain;
     if (open == 0)

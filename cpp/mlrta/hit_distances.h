@@ -8,18 +8,25 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <span>
 
 namespace mlrt {
 
 // Of rays with one common origin. Neighbouring packets mostly hit the same triangles: their
-// planes are kept in a small direct-mapped table.
+// planes are kept in a small direct-mapped table. Planes are made side by side.
 //
 // Pairs of floats take less time than double precision, of which a register holds half as
 // many, and which rays must be converted to. They round nearly all distances for certain.
 class HitDistances {
 public:
-    HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {}
+    HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {
+        known_.fill(NO_PRIMITIVE);
+    }
+
+    // Makes planes of triangles that of() is likely to be asked for. More of them than
+    // these would leave each other no room.
+    static constexpr uint32_t MOST_PREPARED = 256;
+    void prepare(std::span<const uint32_t> primitives);
 
     // Distances at which sixteen rays of a group, from `first_ray` on, meet a triangle
     // each. The rays in the given lanes, one at least, must hit it, and the largest
@@ -30,21 +37,16 @@ public:
 
 private:
     // The distance is 1 / normal.d, of a normal that is the sum of two floats. Relative to
-    // it, the error of the computed one is at most `share`, plus `direction_share` times
-    // the greatest absolute component of d by the size of normal.d. That component times
-    // `anchor` is four times the sum of the absolute products of normal and d, or more.
+    // it, the error of the computed one is at most `error` times the greatest absolute
+    // component of d by the size of normal.d. That component times `anchor` is four times
+    // the sum of the absolute products of normal and d, or more.
     //
     // One plane, or one a lane.
     template <typename Value>
     struct Planes {
-        Value normal[4], rest[4]; // the fourth is any number
-        Value anchor, share, direction_share;
+        Value normal[3], anchor, rest[3], error;
     };
-    struct Plane : Planes<float> {
-        uint32_t primitive;
-
-        Plane(uint32_t number, const Triangle &triangle, Vec3f origin);
-    };
+    struct alignas(32) Plane : Planes<float> {};
     // Distances, and the lanes in which they are rounded correctly for certain.
     struct Rounded {
         FloatPacket values;
@@ -52,8 +54,9 @@ private:
     };
 
     const Plane &plane_of(uint32_t primitive);
-    FloatPacket of_new(uint32_t primitive, const RayGroup &rays, uint32_t first_ray,
-                       LaneBits lanes, const UIntPacket &primitives, Counters &counters);
+    void put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitives);
+    FloatPacket of_new(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
+                       const UIntPacket &primitives, Counters &counters);
     FloatPacket of_several(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                            const UIntPacket &primitives, Counters &counters);
     template <typename Value>
@@ -63,11 +66,14 @@ private:
                           Counters &counters) const;
     float of_one(Vec3f direction, uint32_t primitive, Counters &counters) const;
 
-    static constexpr uint32_t SIZE = 64;
+    static constexpr uint32_t SIZE = 512;
+
+    bool knows(uint32_t primitive) const { return known_[primitive % SIZE] == primitive; }
 
     const KdTree &tree_;
     Vec3f origin_;
-    std::array<std::optional<Plane>, SIZE> planes_;
+    std::array<uint32_t, SIZE> known_; // whose planes there are
+    std::array<Plane, SIZE> planes_;
 };
 
 } // namespace mlrt

@@ -109,6 +109,7 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
+    store(ray_error, edge_bound);
 
     // Where the vertices lie in the rectangle: two roundings and what double precision
     // leaves, a difference, two products and a sum, and the middle and extent of all.
@@ -141,10 +142,11 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
             // The area's error acts on a depth of at most the size.
             const Real slopes = absolute(form_u) + absolute(form_v);
             const Real error =
-                EXACT ? 2.0f * (PLANE_ROUNDINGS * fused(slopes, rays, absolute(form_1)) +
-                                slopes * uncertainty + 2.0f * (share * size) +
-                                UNDERFLOW * inverse_size)
-                      : Real(0.0f);
+                EXACT_DISTANCES
+                    ? 2.0f * (PLANE_ROUNDINGS * fused(slopes, rays, absolute(form_1)) +
+                              slopes * uncertainty + 2.0f * (share * size) +
+                              UNDERFLOW * inverse_size)
+                    : Real(0.0f);
             store(depth_error, error);
             store(depth_grow, Real(1.0f));
             store(depth_shrink, Real(1.0f));

@@ -100,8 +100,9 @@ FloatPacket BeamPackets::load_parallel_packet(const RayGroup &rays, uint32_t las
                             FloatPacket &greatest) {
         const FloatPacket way = t * main;
         const FloatPacket depth = z + way;
-        const FloatPacket error =
-            EXACT ? DEPTH_ROUNDINGS * (absolute(z) + way) + TINY_DEPTH : FloatPacket(0.0f);
+        const FloatPacket error = EXACT_DISTANCES
+                                      ? DEPTH_ROUNDINGS * (absolute(z) + way) + TINY_DEPTH
+                                      : FloatPacket(0.0f);
         // Nothing is nearer than what lies infinitely far.
         const auto far = ~(way < INFINITE);
         least = select(far, FloatPacket(-INFINITE), -(depth + error));

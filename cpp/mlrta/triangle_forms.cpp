@@ -26,9 +26,9 @@ constexpr float UNDERFLOW = 0x1p-146f;
 // difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
 // have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
 // a rectangle two roundings lead to the form's value at the center, three to its change
-// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S; 40
-// covers products of roundings and the bound itself.
-constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF;
+// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S, and 20 s
+// e S for a ray; 40 and 21 cover products of roundings and the bound itself.
+constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF, RAY_ROUNDINGS = 21 * FLOAT_ROUNDOFF;
 // Depth: N comes from double precision, where thin triangles keep its digits. With n its
 // largest component, 12 roundings of at most n S are left, and that of the bound.
 constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
@@ -78,7 +78,7 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
 
     const Real inverse = 1.0f / volume;
     safe &= absolute(volume) > SMALLEST_VOLUME;
-    Real share, edge_bound, depth_bound;
+    Real share, edge_bound, ray_bound, depth_bound;
     if constexpr (EXACT) {
         const Real edge = maximum(largest_component(ab),
                                   maximum(largest_component(bc), largest_component(ca)));
@@ -88,11 +88,12 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         share = volume_error * inverse_size;
         safe &= share <= LARGEST_SHARE;
         edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
+        ray_bound = (RAY_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
         depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
                       sum * inverse_size;
         unsafe = given & ~to_bits(safe);
     } else {
-        share = edge_bound = depth_bound = Real(0.0f);
+        share = edge_bound = ray_bound = depth_bound = Real(0.0f);
         unsafe = 0;
     }
     const LaneBits safe_bits = to_bits(safe) & given;
@@ -100,6 +101,7 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
+    store(ray_error, ray_bound);
 
     // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
     // two products and a sum follow, and the middle and extent of all: less than 16 of at
@@ -174,10 +176,10 @@ MaskOf<Real> TriangleForms::may_hit(const Bounds &bounds, const Real &least,
     };
     const Real edges = minimum(greatest_of(0), minimum(greatest_of(1), greatest_of(2)));
     const Real depth = greatest_of(DEPTH);
-    if constexpr (!EXACT)
-        return touched & (edges >= 0.0f) & (depth >= least);
-    const Real highest = fused(depth, value_of(depth_grow), value_of(depth_error));
-    return touched & (edges + value_of(edge_error) >= 0.0f) & (highest >= least);
+    const Real highest =
+        EXACT_DISTANCES ? fused(depth, value_of(depth_grow), value_of(depth_error)) : depth;
+    const Real edge_bound = EXACT ? value_of(edge_error) : Real(0.0f);
+    return touched & (edges + edge_bound >= 0.0f) & (highest >= least);
 }
 
 LaneBits TriangleForms::packets_for(uint32_t lane, const BeamPackets::Run &run) const {
@@ -199,7 +201,7 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
     const auto inside = edges > (EXACT ? value_of(edge_error) : FloatPacket(0.0f));
     packets.least = least_of(DEPTH);
     packets.greatest = greatest<FloatPacket>(DEPTH, run, value_of);
-    if constexpr (EXACT) {
+    if constexpr (EXACT_DISTANCES) {
         const FloatPacket error = value_of(depth_error);
         packets.least = fused(packets.least, value_of(depth_shrink), -error);
         packets.greatest = fused(packets.greatest, value_of(depth_grow), error);

@@ -44,10 +44,11 @@ struct alignas(64) TriangleForms {
     // infinite if a vertex does not lie ahead.
     Lanes box_p, box_q, box_half_p, box_half_q;
 
-    // A computed edge form is within edge_error of the exact one, anywhere in the beam.
+    // A computed edge form is within edge_error of the exact one, anywhere in the beam, and
+    // within ray_error of it if it is computed for a ray.
     // With x a computed reciprocal depth, the exact one, if positive, is at least x *
     // depth_shrink - depth_error and at most x * depth_grow + depth_error.
-    Lanes edge_error, depth_error, depth_shrink, depth_grow;
+    Lanes edge_error, ray_error, depth_error, depth_shrink, depth_grow;
 
     // Triangles that rays of the beam may hit nearer than all of them already have, and
     // those of which the forms say nothing.

@@ -12,7 +12,11 @@ from mlrt_compare.bench.frame_runs import FrameRun, measured_in_turns, needs_run
 from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
 from mlrt_compare.bench.measure import Timing, in_turns
 from mlrt_compare.bench.rays_contenders import ray_contenders
-from mlrt_compare.bench.rays_goals import cost_of_exactness, ray_speedup
+from mlrt_compare.bench.rays_goals import (
+    cost_of_exactness,
+    cost_of_watertightness,
+    ray_speedup,
+)
 from mlrt_compare.bench.speedup import Speedup, ratio_lines, speedup
 
 QUIET = Timing(wall=1.0, cpu=1.9, waited=0.0)
@@ -257,23 +261,30 @@ def test_cost_of_exactness_is_told_of_the_same_runs() -> None:
 
     own, embree = contender("MLRT", [3.0, 4.0, 6.0]), contender("Embree HIGH NM", [1.0])
     inexact = contender("MLRT inexact", [2.0, 2.0, 3.0])
-    block = {"spp": 1, "shadows": False, "contenders": [own, embree, inexact]}
+    watertight = contender("MLRT watertight", [2.5, 3.0, 4.0])
+    block = {"spp": 1, "shadows": False, "contenders": [own, embree, inexact, watertight]}
     assert cost_of_exactness(block) == {"best": 1.5, "median": 2.0, "cpu": 1.5}
-    # It is nobody's peer.
+    assert cost_of_watertightness(block) == {"best": 1.25, "median": 1.5, "cpu": 1.25}
+    # They are nobody's peers.
     assert ray_speedup("office", block).best == pytest.approx(1 / 3)
     assert cost_of_exactness({**block, "contenders": [own, embree]}) is None
+    assert cost_of_watertightness({**block, "contenders": [own, embree, inexact]}) is None
 
 
 def test_the_plugin_is_exact() -> None:
-    """Only the benchmarks' second module is compiled without exactness."""
-    named = [
-        path.relative_to(repository.ROOT).as_posix()
-        for folder in ("cpp", "compare/benchmarks")
-        for path in (repository.ROOT / folder).rglob("*")
-        if path.is_file() and "MLRT_INEXACT" in path.read_text(errors="ignore")
-    ]
-    assert sorted(named) == ["compare/benchmarks/CMakeLists.txt", "cpp/base/exactness.h"]
+    """Only further modules of the benchmarks are compiled with less exactness."""
     recipe = (repository.ROOT / "compare/benchmarks/CMakeLists.txt").read_text()
-    assert (
-        recipe.count("target_compile_definitions(_bench_inexact PRIVATE MLRT_INEXACT)") == 1
-    )
+    for kind in ("inexact", "watertight"):
+        macro = f"MLRT_{kind.upper()}"
+        named = [
+            path.relative_to(repository.ROOT).as_posix()
+            for folder in ("cpp", "compare/benchmarks")
+            for path in (repository.ROOT / folder).rglob("*")
+            if path.is_file() and macro in path.read_text(errors="ignore")
+        ]
+        assert sorted(named) == [
+            "compare/benchmarks/CMakeLists.txt",
+            "cpp/base/exactness.h",
+        ]
+        assert recipe.count(macro) == 1
+        assert f"target_compile_definitions(_bench_{kind} PRIVATE {macro})" in recipe

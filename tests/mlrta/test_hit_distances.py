@@ -80,3 +80,28 @@ def test_distances_are_the_nearest_floats(
         np.testing.assert_array_equal(found.t[there], exact, f"seed {SEED}")
         hit += int(there.sum())
     assert hit > TRIANGLES * RAYS / 4
+
+
+@each_core
+def test_distances_of_many_triangles_in_a_beam(core: ModuleType) -> None:
+    """Planes are made several at once, and more than are kept: whichever triangle a ray
+    hits, its distance is that of this triangle."""
+    rng = np.random.default_rng(SEED)
+    side = 32
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, side), np.linspace(-0.2, 0.2, side))
+    directions = np.stack([x, y, np.ones_like(x)], axis=2).reshape(-1, 3)
+    directions *= rng.uniform(0.5, 2, (side * side, 1))
+    depth = 10 ** rng.uniform(-1, 2, (side * side, 1, 1))
+    size = 0.4 / side * depth * np.linalg.norm(directions, axis=1)[:, None, None]
+    corners = directions[:, None] * depth + size * rng.normal(size=(side * side, 3, 3))
+    faces = np.arange(3 * side * side, dtype=np.uint32).reshape(-1, 3)
+    vertices = corners.astype(np.float32).reshape(-1, 3)
+    rays = np.zeros((side * side, 3), np.float32), directions.astype(np.float32)
+    for traversal in ("beam_leaf", "adaptive"):
+        found = closest(build(core, (vertices, faces)), rays, TRAVERSALS[traversal])
+        there = found.face < len(faces)
+        assert len(np.unique(found.face[there])) > 200, f"seed {SEED}"
+        exact = exact_distances(
+            rays[0][there], rays[1][there], vertices[faces[found.face[there]]]
+        )
+        np.testing.assert_array_equal(found.t[there], exact, f"seed {SEED}")

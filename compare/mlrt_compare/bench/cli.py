@@ -104,7 +104,8 @@ def make_parser() -> Parser:
     rays.add_argument(
         "--inexact",
         action="store_true",
-        help="measure MLRT that trusts single precision too, to tell what exactness costs",
+        help="measure MLRT that trusts single precision too, and such that trusts it in "
+        "distances alone, to tell what exactness and watertightness cost",
     )
     frames = commands.add_parser(
         "frames",

@@ -24,8 +24,9 @@ from .errors import BenchError
 
 SOURCE_FOLDERS = ("cpp", "compare/benchmarks")
 SOURCE_SUFFIXES = (".h", ".cpp", ".cmake", ".txt")
-EXACT, INEXACT = "_bench", "_bench_inexact"
-"""Modules: with the core as it is, and with one that trusts single precision."""
+EXACT, INEXACT, WATERTIGHT = "_bench", "_bench_inexact", "_bench_watertight"
+"""Modules: with the core as it is, with one that trusts single precision, and with one that
+trusts it in distances, but not in what is hit."""
 PACKAGES = ("nanobind", "drjit", "mitsuba")
 """Whose headers and libraries the module is compiled with."""
 REMEDY = "install what benchmarks need with pip install 'mlrt[bench]'"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,13 @@ from .contenders import QUALITIES, embree_device
 from .frame_runs import FrameRun, measured_in_turns
 from .measure import Timing, best, waiting_seconds
 from .native import Native
-from .rays_contenders import RayContender, Variant, inexact_contender, ray_contenders
-from .rays_goals import cost_of_exactness, ray_speedup
+from .rays_contenders import (
+    RayContender,
+    Variant,
+    less_exact_contender,
+    ray_contenders,
+)
+from .rays_goals import cost_of_exactness, cost_of_watertightness, ray_speedup
 from .scenes import BenchScene
 from .status import show_status
 from .table import plural
@@ -60,15 +66,15 @@ class Traced:
 
 
 class RayBenchmark:
-    """All measurements of one scene. ``inexact``: the native side that is not exact, if it
-    is to be measured as well."""
+    """All measurements of one scene. ``less_exact``: native sides of other kinds of MLRT
+    that are to be measured as well."""
 
     def __init__(
         self,
         native: Native,
         scene: BenchScene,
         settings: Settings,
-        inexact: Native | None = None,
+        less_exact: Mapping[str, Native] | None = None,
     ) -> None:
         self._module = native.module
         self._scene = scene
@@ -88,11 +94,12 @@ class RayBenchmark:
                 )
                 for quality in QUALITIES
             }
-            self._inexact = None if inexact is None else inexact.module
-            if self._inexact is not None:
-                mesh = self._inexact.Mesh(scene.vertices, scene.faces)
-                self._inexact_tree = self._inexact.KdTree(mesh, {"builder": "auto"})
-                self._inexact_tree.widen()
+            self._less_exact: dict[str, tuple[ModuleType, Any]] = {}
+            for kind, other in (less_exact or {}).items():
+                mesh = other.module.Mesh(scene.vertices, scene.faces)
+                tree = other.module.KdTree(mesh, {"builder": "auto"})
+                tree.widen()
+                self._less_exact[kind] = (other.module, tree)
         self._image = np.zeros((side, side), np.float32)
 
     def facts(self) -> dict[str, Any]:
@@ -132,15 +139,16 @@ class RayBenchmark:
                     self._settings.trace,
                     self._settings.tiles,
                 )
-                if self._inexact is not None:
-                    contenders.append(
-                        inexact_contender(
-                            self._inexact_tree,
-                            self._inexact.View(self._scene.view, side, side, grid),
-                            self._settings.trace,
-                            self._settings.tiles,
-                        )
+                contenders += [
+                    less_exact_contender(
+                        kind,
+                        tree,
+                        module.View(self._scene.view, side, side, grid),
+                        self._settings.trace,
+                        self._settings.tiles,
                     )
+                    for kind, (module, tree) in self._less_exact.items()
+                ]
                 with thread_count(max(self._settings.threads)):
                     facts = self._agreement(contenders, view, spp, shadows)
                 with thread_count(1):
@@ -271,6 +279,7 @@ class RayBenchmark:
         }
         block["speedup"] = ray_speedup(self._scene.name, block).as_dict()
         block["exactness"] = cost_of_exactness(block)
+        block["watertightness"] = cost_of_watertightness(block)
         return block
 
 

@@ -11,9 +11,10 @@ from .checkout import find_checkout
 from .errors import BenchError
 from .figures import measure_scenes, new_figures, show
 from .machine import machine_record
-from .native import INEXACT, Native, load_native
+from .native import EXACT, Native, load_native
 from .options import default_cache
 from .rays import RayBenchmark, Settings
+from .rays_contenders import INEXACT, WATERTIGHT
 from .scenes import BenchScene, chosen_scenes, scenes_of_rays
 
 
@@ -23,7 +24,11 @@ def run(options: argparse.Namespace) -> bool:
     scenes = chosen_scenes(options.scenes, scenes_of_rays(source))
     cache = options.cache or default_cache()
     native = load_native(source, cache)
-    inexact = load_native(source, cache, INEXACT) if options.inexact else None
+    less_exact = {
+        kind: load_native(source, cache, f"{EXACT}_{kind}")
+        for kind in (INEXACT, WATERTIGHT)
+        if options.inexact
+    }
     check_trace(native, options.trace)
     settings = Settings(
         options.threads,
@@ -37,7 +42,7 @@ def run(options: argparse.Namespace) -> bool:
     show(rays_table.head_lines(figures["machine"], figures["settings"]))
 
     def measure(loaded: BenchScene, scene: dict[str, Any]) -> None:
-        benchmark = RayBenchmark(native, loaded, settings, inexact)
+        benchmark = RayBenchmark(native, loaded, settings, less_exact)
         scene |= {"triangles": len(loaded.faces), **benchmark.facts(), "blocks": []}
         for block in benchmark.blocks():
             scene["blocks"].append(block)

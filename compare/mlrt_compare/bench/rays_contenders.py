@@ -9,8 +9,8 @@ from typing import Any
 from .contenders import EMBREE, MLRT, QUALITIES
 from .frame_runs import FrameRun
 
-INEXACT = "inexact"
-"""The kind of MLRT that trusts single precision."""
+INEXACT, WATERTIGHT = "inexact", "watertight"
+"""Kinds of MLRT that trust single precision: in all, and in distances alone."""
 EMBREE_MODES = {"r16": ("r16",), "NM": ("NM8", "NM16"), "1M": ("1M",)}
 """Ways in which Embree takes many rays, by what the native side calls their variants:
 coherent packets of 16, coherent streams of packets of 8 or 16, incoherent streams."""
@@ -86,9 +86,9 @@ def ray_contenders(
     return contenders
 
 
-def inexact_contender(
-    tree: Any, view: Any, trace: dict[str, Any], tiles: Sequence[int]
+def less_exact_contender(
+    kind: str, tree: Any, view: Any, trace: dict[str, Any], tiles: Sequence[int]
 ) -> RayContender:
-    """MLRT with a core that trusts single precision; tree and view are of its module."""
+    """MLRT with a core of the given kind; tree and view are of its module."""
     variants = [mlrt_variant(tree, trace, tile, view) for tile in tiles]
-    return RayContender(MLRT, INEXACT, variants)
+    return RayContender(MLRT, kind, variants)

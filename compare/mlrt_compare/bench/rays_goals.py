@@ -6,7 +6,7 @@ from typing import Any
 
 from .contenders import EMBREE, MLRT
 from .measure import best, median
-from .rays_contenders import INEXACT
+from .rays_contenders import INEXACT, WATERTIGHT
 from .speedup import Speedup, frame_seconds, speedup
 
 Work = tuple[int, bool]
@@ -45,12 +45,21 @@ def ray_speedup(scene: str, block: dict[str, Any]) -> Speedup:
 def cost_of_exactness(block: dict[str, Any]) -> dict[str, float] | None:
     """Seconds of MLRT over those of MLRT that trusts single precision, if that was
     measured: the best and the median on the clock, and the best in CPU time."""
-    own = next(c for c in block["contenders"] if c["engine"] == MLRT)
-    inexact = [c for c in block["contenders"] if c["name"] == f"{MLRT} {INEXACT}"]
-    if not inexact:
+    return cost_beside_inexact(block, MLRT)
+
+
+def cost_of_watertightness(block: dict[str, Any]) -> dict[str, float] | None:
+    """The same of MLRT that trusts single precision in distances alone."""
+    return cost_beside_inexact(block, f"{MLRT} {WATERTIGHT}")
+
+
+def cost_beside_inexact(block: dict[str, Any], name: str) -> dict[str, float] | None:
+    by_name = {contender["name"]: contender for contender in block["contenders"]}
+    own, inexact = by_name.get(name), by_name.get(f"{MLRT} {INEXACT}")
+    if own is None or inexact is None:
         return None
     return {
-        name: pick(frame_seconds(own, clock)) / pick(frame_seconds(inexact[0], clock))
+        name: pick(frame_seconds(own, clock)) / pick(frame_seconds(inexact, clock))
         for name, pick, clock in (
             ("best", best, "wall"),
             ("median", median, "wall"),

@@ -1,4 +1,4 @@
-// Triangles of which it is plain that they lie in one plane.
+// Triangles that lie in one plane.
 #pragma once
 
 #include "geometry/triangle.h"
