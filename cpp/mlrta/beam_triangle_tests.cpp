@@ -38,9 +38,9 @@ void BeamTriangleTests<query>::test_first(std::span<const uint32_t> primitives) 
     flush();
 }
 
-// The first leaves' triangles are tested at once, as they may stop all rays. Those of a beam
-// that goes on wait till a block is full, and where it meets many, until those of the next
-// leaves have been fetched as well: the memory has time to bring them.
+// The first leaves' triangles are tested at once, as they may stop all rays. Those of a
+// beam that goes on wait till a block is full, and where it meets many, until those of the
+// next leaves have been fetched as well: the memory has time to bring them.
 template <Query query>
 void BeamTriangleTests<query>::test_leaf(KdNode leaf) {
     const bool fills = blocks_ >= BLOCKS_AT_ONCE;
