@@ -21,7 +21,7 @@ struct Counters {
     uint64_t beam_triangles = 0;  // triangles that a beam was found to meet
     uint64_t double_tests = 0; // ray against triangle that single precision left undecided
     uint64_t exact_distances = 0; // distances that double precision could not round
-    uint64_t exact_tests = 0;     // ... and that double precision left undecided
+    uint64_t exact_tests = 0;     // ray against triangle that it left undecided
     uint64_t tiles = 0;           // for which an entry point was searched
     uint64_t missed_tiles = 0;    // that no leaf can hold a hit for
     uint64_t splits = 0;          // tiles that were split

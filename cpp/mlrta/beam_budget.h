@@ -12,11 +12,14 @@ class BeamBudget {
 public:
     // Gives a beam up that was tested against `most_triangles`.
     explicit BeamBudget(uint32_t most_triangles) : most_triangles_(most_triangles) {}
-    // Also one that finds little: after `first_look` triangles, and whenever there are
-    // twice as many, fewer than `least_yield` of its rays a triangle have found something.
+    // Also one that finds little: after `first_look` triangles, one at least, and whenever
+    // there are twice as many, fewer than `least_yield` of its rays a triangle have found
+    // something.
     BeamBudget(uint32_t most_triangles, uint32_t first_look, float least_yield)
         : most_triangles_(most_triangles), next_look_(first_look),
-          least_yield_(least_yield) {}
+          least_yield_(least_yield) {
+        MLRT_CHECK(first_look > 0);
+    }
 
     static BeamBudget without_end() {
         return BeamBudget(std::numeric_limits<uint32_t>::max());

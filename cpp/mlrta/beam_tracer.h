@@ -124,6 +124,10 @@ private:
             count > LARGE_BEAM ? BeamBudget(MOST_OF_HUGE_BEAM) : budget_of(active);
         const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
                                                          budget, beam, counters_);
+        if (const float share = cost.share(active); share > 0)
+            for (uint32_t n = 0; n < beam.count; ++n)
+                cost.add_to_lanes(beam.lanes[n].first_ray, beam.lanes[n].active, share);
+        counters_.fallbacks += !done;
         if (!done && count > LARGE_BEAM) {
             counters_.rays -= active;
             counters_.packets -= beam.count;
@@ -135,10 +139,6 @@ private:
         else if (done && spent > DENSE)
             tree_.widening->miss(active); // rays that had better go apart
         memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
-        if (const float share = cost.share(active); share > 0)
-            for (uint32_t n = 0; n < beam.count; ++n)
-                cost.add_to_lanes(beam.lanes[n].first_ray, beam.lanes[n].active, share);
-        counters_.fallbacks += !done;
         if constexpr (Output::query == Query::closest && EXACT_DISTANCES)
             if (done && output_.wants_distances())
                 memory_.distances.prepare({memory_.hit.data(), memory_.hit_count});
