@@ -330,6 +330,32 @@ def test_tiles_find_what_brute_force_does(core: ModuleType, samples: int) -> Non
     assert hits > 2000 and (lazy > 0 or samples == 3), (SEED, hits, lazy)
 
 
+@each_core
+@pytest.mark.parametrize(("samples", "size"), [(1, 64), (16, 16)])
+def test_the_largest_beams_are_divided_where_they_meet_many_triangles(
+    core: ModuleType, samples: int, size: int
+) -> None:
+    rng = np.random.default_rng([SEED, samples, 1])
+    tile = random_tile(rng, samples, size)
+    while not beam_of(core, tile, 0, 4096, 0, np.inf).describe()["is_by_film"]:
+        tile = random_tile(rng, samples, size)
+    origins = np.tile(np.float32(tile.origin), (4096, 1))
+    trees = [build(core, scene_ahead(rng, tile, kind)) for kind in (3, 0, 3)]
+    # Each follows another one, so that what beams of its own gained or lost is forgotten.
+    for tree, beams in zip(trees, (None, 1, 5), strict=True):
+        exact = closest(tree, (origins, tile.directions), BRUTE_FORCE)
+        t, face, counters = core.beam_leaf_selftest.trace_tile(
+            tree, tile.origin, tile.directions, tile.map, tile.square, 0.0, np.inf,
+            TRAVERSALS["beam_leaf"],
+        )  # fmt: skip
+        assert np.array_equal(face.view(np.int32), exact.face), SEED
+        assert np.array_equal(t, exact.t), SEED
+        assert counters["rays"] == 4096
+        if beams is not None:
+            assert counters["beams"] == beams
+            assert counters["fallbacks"] == (beams > 1)
+
+
 def scene_ahead(rng: np.random.Generator, tile: Tile, kind: int) -> workloads.Scene:
     directions = np.float64(tile.directions)
     middle = directions.mean(axis=0)
