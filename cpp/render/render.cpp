@@ -43,7 +43,7 @@ FilmTarget film_target(RenderResult &result) {
 // A tile, unless there would be too few of them for all threads to have work.
 uint32_t rays_per_group(const TraceOptions &options, double samples) {
     constexpr double ENOUGH_GROUPS = 16; // chosen
-    constexpr double LARGE_BEAM = 1024;  // smaller groups would cut beams short
+    constexpr double LARGE_BEAM = 1024;  // smaller groups would cut usual beams short
     const double tile = double(options.initial_tile) * options.initial_tile;
     return uint32_t(std::min(tile, std::max(LARGE_BEAM, samples / ENOUGH_GROUPS)));
 }
