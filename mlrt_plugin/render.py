@@ -55,7 +55,7 @@ class RenderResult:
     timings: seconds of load, build and render; with a cache of trees those that
     `ObtainedTree` names in place of build.
     counters: what the traversal did, of `cpp/base/counters.h`, for primary and shadow rays;
-    none where Mitsuba shades.
+    none where Mitsuba shades. Unlike pictures they may differ from run to run.
     warnings: what was approximated or ignored.
     """
 
