@@ -1,7 +1,7 @@
 // What a traversal did. Counted per group of rays that is traced together, as in the paper;
 // rays that go alone, through the kd-tree or the wide tree, are groups of their own, and
-// nodes are those of either tree. A block of the wide tree counts as a leaf. Which beams are
-// tried depends on those that the same thread traced before: so do counts, unlike hits.
+// nodes are those of either tree. A block of the wide tree counts as a leaf. Which beams
+// are tried depends on those that the same thread traced before: so do counts, unlike hits.
 #pragma once
 
 #include <cstdint>
