@@ -61,7 +61,8 @@ private:
 
     // A large beam shares the walk, and what is made of each triangle, by more rays: it
     // pays for a camera's rays, and for others that are as close to each other.
-    static constexpr uint32_t HUGE_BEAM = BeamPackets::MAX_RAYS, LARGE_BEAM = 1024;
+    static constexpr uint32_t HUGE_BEAM = BeamPackets::MAX_RAYS;
+    static constexpr uint32_t LARGE_BEAM = Occupancy::MOST_RAYS;
     static constexpr uint32_t SMALL_BEAM = RayNumbers::CAPACITY;
 
     // A beam that is larger still, of a camera's rays. Returns false if it was not tried,

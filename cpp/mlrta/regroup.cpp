@@ -1,5 +1,7 @@
 #include "mlrta/regroup.h"
 
+#include "base/check.h"
+
 #include <algorithm>
 #include <bit>
 
@@ -41,6 +43,7 @@ void RayNumbers::add(uint32_t first, LaneBits lanes) {
 }
 
 Occupancy::Occupancy(const BeamPackets &beam) {
+    MLRT_CHECK(beam.count * PACKET_WIDTH <= MOST_RAYS);
     // Bits of cells, those of the lower and those of the upper half of the rectangle.
     constexpr uint32_t HALF = SIDE * SIDE / 2;
     const UIntPacket none(0u), one(1u);

@@ -27,7 +27,10 @@ struct RayNumbers {
 class Occupancy {
 public:
     static constexpr int SIDE = 8;
+    // Beams of more rays, which only cameras make, are not regrouped.
+    static constexpr uint32_t MOST_RAYS = 1024;
 
+    // Of a beam of up to MOST_RAYS rays.
     explicit Occupancy(const BeamPackets &beam);
 
     // A line across the rectangle: rays with less than `cell` cells along the axis (0 for
@@ -52,7 +55,7 @@ public:
 
 private:
     uint64_t cells_ = 0;
-    std::array<uint32_t, BeamPackets::MAX_RAYS> cell_; // of each ray that is active
+    std::array<uint32_t, MOST_RAYS> cell_; // of each ray that is active
 };
 
 // Rays in an order of their own, and their numbers in the group that they are taken from.
