@@ -225,8 +225,8 @@ template <typename Visit>
 void for_each_tile(const View &view, const RayTile &share, uint32_t side, Visit &&visit) {
     const uint32_t count = (share.side / side) * (share.side / side);
     for (uint32_t i = 0; i < count; ++i) {
-        const RayTile tile{share.x + side * even_bits(i),
-                           share.y + side * even_bits(i >> 1), side};
+        const MortonPoint place = of_morton_code(i);
+        const RayTile tile{share.x + side * place.column, share.y + side * place.row, side};
         if (tile.x < view.columns() && tile.y < view.rows())
             visit(tile);
     }

@@ -25,9 +25,6 @@ public:
     bool has(uint32_t packet) const {
         return runs_[packet / PACKET_WIDTH] >> packet % PACKET_WIDTH & 1;
     }
-    void add(uint32_t packet) {
-        runs_[packet / PACKET_WIDTH] |= LaneBits(1) << packet % PACKET_WIDTH;
-    }
     void remove(uint32_t packet) {
         runs_[packet / PACKET_WIDTH] &= ~(LaneBits(1) << packet % PACKET_WIDTH);
     }

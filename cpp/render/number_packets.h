@@ -14,7 +14,7 @@ namespace mlrt {
 [[gnu::always_inline]] inline void mix_words(UIntPacket &v0, UIntPacket &v1) {
     const auto mixed = [](const UIntPacket &v, uint32_t left, uint32_t sum,
                           uint32_t right) {
-        return (shift_left<4>(v) + left) ^ (v + sum) ^ (shift_right<5>(v) + right);
+        return (drjit::sl<4>(v) + left) ^ (v + sum) ^ (drjit::sr<5>(v) + right);
     };
     uint32_t sum = 0;
     for (int round = 0; round < 4; ++round) {
@@ -28,9 +28,9 @@ class Pcg32Packet {
 public:
     Pcg32Packet(UIntPacket seeds, UIntPacket indices) {
         mix_words(seeds, indices);
-        const LongPacket stream = to_long(indices);
+        const LongPacket stream = LongPacket(indices);
         increment_ = stream + (stream + LongPacket(1u));
-        state_ = to_long(seeds) + increment_;
+        state_ = LongPacket(seeds) + increment_;
     }
 
     FloatPacket next_float() {
@@ -38,8 +38,8 @@ public:
         const UIntPacket high = high_words(state_), low = low_words(state_);
         // The lower half of ((state >> 18) ^ state) >> 27.
         const UIntPacket bits =
-            (shift_left<5>(high) | shift_right<27>(low)) ^ shift_right<13>(high);
-        return unit_floats(rotate_right(bits, shift_right<27>(high)));
+            (drjit::sl<5>(high) | drjit::sr<27>(low)) ^ drjit::sr<13>(high);
+        return unit_floats(rotate_right(bits, drjit::sr<27>(high)));
     }
 
 private:

@@ -6,16 +6,19 @@ import argparse
 from dataclasses import asdict
 from typing import Any
 
+from . import rays_contenders as kinds
 from . import rays_table
 from .checkout import find_checkout
 from .errors import BenchError
 from .figures import measure_scenes, new_figures, show
 from .machine import machine_record
-from .native import EXACT, Native, load_native
+from .native import INEXACT, WATERTIGHT, Native, load_native
 from .options import default_cache
 from .rays import RayBenchmark, Settings
-from .rays_contenders import INEXACT, WATERTIGHT
 from .scenes import BenchScene, chosen_scenes, scenes_of_rays
+
+LESS_EXACT = {kinds.INEXACT: INEXACT, kinds.WATERTIGHT: WATERTIGHT}
+"""Modules by the kind of MLRT that is in them."""
 
 
 def run(options: argparse.Namespace) -> bool:
@@ -25,8 +28,8 @@ def run(options: argparse.Namespace) -> bool:
     cache = options.cache or default_cache()
     native = load_native(source, cache)
     less_exact = {
-        kind: load_native(source, cache, f"{EXACT}_{kind}")
-        for kind in (INEXACT, WATERTIGHT)
+        kind: load_native(source, cache, module)
+        for kind, module in LESS_EXACT.items()
         if options.inexact
     }
     check_trace(native, options.trace)
