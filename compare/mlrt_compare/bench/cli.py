@@ -126,6 +126,19 @@ def make_parser() -> Parser:
     tiles.set_defaults(run=run_tiles)
     add_shared_options(tiles, repeats=5)
     add_sample_counts(tiles)
+    turns = commands.add_parser(
+        "turns",
+        help="rays by this checkout and by another commit of it",
+        description="Traces the frame of `rays` with MLRT as it is in the checkout and as "
+        "another commit has it, in turns, and tells the ratios of the times and the rays "
+        "that hit something else. The exit code is 2 if camera rays do.",
+    )
+    turns.set_defaults(run=run_turns)
+    turns.add_argument(
+        "base", metavar="COMMIT", help="what the checkout is compared with, by any name"
+    )
+    add_shared_options(turns, repeats=20)
+    add_sample_counts(turns)
     order = commands.add_parser(
         "order",
         help="nanoseconds a ray by the order that rays are given in",
@@ -287,6 +300,12 @@ def run_rays(options: argparse.Namespace) -> bool:
 
 def run_tiles(options: argparse.Namespace) -> bool:
     from .tiles_command import run
+
+    return run(options)
+
+
+def run_turns(options: argparse.Namespace) -> bool:
+    from .turns_command import run
 
     return run(options)
 

@@ -13,13 +13,13 @@ from typing import Any
 
 import mlrt_plugin
 
-from .native import Native
+from .native import CompiledNative
 
 HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage/enabled")
 GOVERNOR = Path("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
 
 
-def machine_record(source: Path, native: Native | None) -> dict[str, Any]:
+def machine_record(source: Path, native: CompiledNative | None) -> dict[str, Any]:
     """As JSON has it; None for what cannot be found out.
 
     native: if it is measured, what is compiled for benchmarks.

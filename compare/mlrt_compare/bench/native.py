@@ -33,15 +33,21 @@ REMEDY = "install what benchmarks need with pip install 'mlrt[bench]'"
 
 
 @dataclass(frozen=True)
-class Native:
-    """The loaded module, and what made it."""
+class CompiledNative:
+    """The module as a file, and what made it."""
 
-    module: ModuleType
     library: Path
     compiler: str
     """The compiler's name and version."""
     flags: str
     """What code generation depends on: -O, -m, -f and -std options."""
+
+
+@dataclass(frozen=True)
+class Native(CompiledNative):
+    """The same, loaded."""
+
+    module: ModuleType
 
 
 @dataclass(frozen=True)
@@ -117,6 +123,12 @@ def origin_of(package: str) -> str | None:
 def load_native(source: Path, cache: Path, module: str = EXACT) -> Native:
     """The module for the instruction set that `mlrt_plugin` chose, from ``cache`` if it was
     compiled before. Raises BenchError if it cannot be compiled."""
+    compiled = compiled_native(source, cache, module)
+    return Native(**vars(compiled), module=loaded(compiled.library))
+
+
+def compiled_native(source: Path, cache: Path, module: str = EXACT) -> CompiledNative:
+    """The same without loading it, for other processes to do so."""
     tools = find_tools()
     compiler = tools.compiler_version()
     folder = cache / "native" / key_of(source, mlrt_plugin.isa, compiler)
@@ -124,7 +136,7 @@ def load_native(source: Path, cache: Path, module: str = EXACT) -> Native:
     library, flags = folder / f"{module}{suffix}", folder / "flags.txt"
     if not library.is_file():
         compile_native(source, cache, tools, library, flags)
-    return Native(loaded(library), library, compiler, flags.read_text().strip())
+    return CompiledNative(library, compiler, flags.read_text().strip())
 
 
 def loaded(library: Path) -> ModuleType:
