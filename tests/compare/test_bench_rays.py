@@ -13,9 +13,10 @@ import pytest
 import repository
 from bench_command import assert_one_sentence, command
 from bench_rays import expected_rays
+from mlrt_compare.bench.contenders import embree_device
 from mlrt_compare.bench.kernels import closed_meshes, rays_inside
 from mlrt_compare.bench.native import INEXACT, WATERTIGHT, Native, load_native
-from mlrt_compare.bench.rays import Traced, difference
+from mlrt_compare.bench.rays import RayBenchmark, Settings, Traced, difference
 from mlrt_compare.bench.scenes import BenchScene, scenes_of_rays
 from numpy.typing import NDArray
 
@@ -175,6 +176,7 @@ def test_figures_are_whole(measured: tuple[str, dict[str, Any]]) -> None:
     assert (figures["benchmark"], figures["version"]) == ("rays", 1)
     assert figures["machine"]["processor"] and "-O3" in figures["machine"]["flags"]
     assert figures["settings"]["trace"] == {"minimum_tile": 8}
+    assert figures["settings"]["same_isa"] is False
     office, absent = figures["scenes"]
     assert office["skipped"] is None and "absent.xml" in absent["skipped"]
     assert office["embree"]["version"].startswith("3.")
@@ -257,6 +259,24 @@ def test_tables_are_there(measured: tuple[str, dict[str, Any]]) -> None:
     assert [line.split("  ")[0] for line in lines[head + 1 :]] == [
         *("office, 1 thread", "office, 2 threads")
     ]
+
+
+def test_embree_may_be_limited_to_the_instruction_set_of_mlrt(native: Native) -> None:
+    """Embree 3 has packets of 16 rays with AVX-512 only."""
+    module = native.module
+    native_packets = {
+        isa: bool(embree_device(module, 1, isa).has_native_packets)
+        for isa in ("avx2", "avx512")
+    }
+    assert not native_packets["avx2"]
+    if module.isa == "avx512":
+        assert native_packets["avx512"]
+    settings = Settings((1,), 1, 16, (1,), (16,), {}, same_isa=True)
+    scene = BenchScene(
+        "one", np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.uint32), {}
+    )
+    device = RayBenchmark(native, scene, settings)._device
+    assert bool(device.has_native_packets) == (module.isa == "avx512")
 
 
 def test_options_that_the_tracer_does_not_have_are_one_sentence(

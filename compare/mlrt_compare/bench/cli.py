@@ -102,6 +102,12 @@ def make_parser() -> Parser:
         help="how MLRT traces, such as traversal=interval,minimum_tile=16 (as usual)",
     )
     rays.add_argument(
+        "--same-isa",
+        action="store_true",
+        help="limit Embree to MLRT's instruction set, that of MLRT_ISA in the environment "
+        "or the best of the machine",
+    )
+    rays.add_argument(
         "--inexact",
         action="store_true",
         help="measure MLRT that trusts single precision too, and such that trusts it in "

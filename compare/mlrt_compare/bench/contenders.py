@@ -45,12 +45,14 @@ class Contender:
         return sum(not run.busy for run in self.runs) < repeats
 
 
-def embree_device(module: ModuleType, threads: int) -> Any:
+def embree_device(module: ModuleType, threads: int, isa: str | None = None) -> Any:
     """A device whose threads are started beforehand, as those of MLRT's pool are.
 
-    There should be one at a time: see the native side.
+    isa: the widest instruction set that it may use, by Embree's name; all for None. There
+    should be one device at a time: see the native side.
     """
-    return module.EmbreeDevice(f"threads={threads},set_affinity=0,start_threads=1")
+    limit = "" if isa is None else f",isa={isa}"
+    return module.EmbreeDevice(f"threads={threads},set_affinity=0,start_threads=1{limit}")
 
 
 def contenders_of(module: ModuleType, device: Any) -> list[Contender]:

@@ -50,6 +50,8 @@ class Settings:
     tiles: tuple[int, ...]
     trace: dict[str, Any]
     """Options of MLRT's tracer, where they are not the usual ones."""
+    same_isa: bool = False
+    """Whether Embree is limited to the instruction set of MLRT."""
 
 
 @dataclass
@@ -87,7 +89,8 @@ class RayBenchmark:
             self._tree = self._module.KdTree(self._mesh, {"builder": "auto"})
             self._tree.widen()
             # Rays are traced by threads of our own, however many Embree builds with.
-            self._device = embree_device(self._module, most)
+            isa = str(self._module.isa) if settings.same_isa else None
+            self._device = embree_device(self._module, most, isa)
             self._embree = {
                 quality: self._module.EmbreeScene(
                     self._device, self._mesh, quality == "HIGH"

@@ -40,6 +40,7 @@ def run(options: argparse.Namespace) -> bool:
         options.spp,
         options.tiles,
         options.trace,
+        options.same_isa,
     )
     figures = new_figures("rays", machine_record(source, native), asdict(settings))
     show(rays_table.head_lines(figures["machine"], figures["settings"]))

@@ -28,6 +28,7 @@ def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
         "that others left alone, which are counted of all runs; tile: rays along the side "
         "of what is handed over at once, the best of "
         f"{', '.join(map(str, settings['tiles']))}",
+        *([f"Embree is limited to {machine['isa']}"] if settings["same_isa"] else []),
         "differs: rays for which MLRT and Embree differ in hit or miss, in the triangle, "
         "in whether the light is seen",
     ]

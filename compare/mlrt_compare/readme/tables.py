@@ -76,6 +76,13 @@ def ray_lines(all_figures: Figures) -> list[str]:
             line += ["-", "-"] if found is None else [*ray_cells(found)]
         rows.append(line)
     blocks = [block for figures in all_figures for _, block in blocks_of(figures)]
+    limited = dict.fromkeys(
+        isa_of(figures) for figures in all_figures if figures["settings"].get("same_isa")
+    )
+    limits = [
+        f"In columns of {isa} Embree is limited to it as well (`--same-isa`)."
+        for isa in limited
+    ]
     return [
         f"`mlrt-bench rays`: {pixels_of(all_figures)} pixels; the same rays by MLRT and by "
         "Embree 3 of the mitsuba wheel in whichever of its modes and build qualities is "
@@ -84,8 +91,13 @@ def ray_lines(all_figures: Figures) -> list[str]:
         "",
         *table(head, rows),
         "",
-        "Embree has packets of 16 rays with AVX-512 and not without; MLRT tests 8 "
-        "triangles at a time, and with AVX-512 16 where a beam meets many.",
+        " ".join(
+            [
+                *limits,
+                "Embree has packets of 16 rays with AVX-512 and not without; MLRT tests 8 "
+                "triangles at a time, and with AVX-512 16 where a beam meets many.",
+            ]
+        ),
     ]
 
 
