@@ -14,11 +14,12 @@ from bench_command import assert_one_sentence, command
 from bench_rays import expected_rays
 from mlrt_compare.bench.commits import commit_named, sources_of
 from mlrt_compare.bench.errors import BenchError
+from mlrt_compare.bench.frame_runs import FrameSettings
 from mlrt_compare.bench.native import Native, key_of
 from mlrt_compare.bench.scenes import BenchScene
-from mlrt_compare.bench.turns import BASE, NEW, Frames, Process, Settings, measure_turns
+from mlrt_compare.bench.turns import BASE, NEW, Frames, Process, measure_turns
 
-SETTINGS = Settings(threads=(1,), repeats=2, resolution=37, spp=(1,))
+SETTINGS = FrameSettings(threads=(1,), repeats=2, resolution=37, spp=(1,))
 
 needs_history = pytest.mark.skipif(
     not (repository.ROOT / ".git").exists(), reason="the sources are no git checkout"

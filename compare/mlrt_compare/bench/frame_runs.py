@@ -11,6 +11,17 @@ from .measure import ROUNDS_A_REPEAT, Timing, in_turns
 
 
 @dataclass(frozen=True)
+class FrameSettings:
+    """What is measured of each scene: frames with each number of threads and samples."""
+
+    threads: tuple[int, ...]
+    repeats: int
+    resolution: int
+    """Pixels along both sides of the frame."""
+    spp: tuple[int, ...]
+
+
+@dataclass(frozen=True)
 class FrameRun:
     """Frames in a row; the figures are those of one."""
 

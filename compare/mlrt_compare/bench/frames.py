@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -21,7 +20,7 @@ from ..mitsuba_renderer import MitsubaRenderer
 from ..mlrt_renderer import MlrtRenderer
 from ..validate import Verdict, judge
 from .errors import BenchError
-from .frame_runs import FrameRun, measured_in_turns
+from .frame_runs import FrameRun, FrameSettings, measured_in_turns
 from .measure import Timing, waiting_seconds
 from .speedup import speedup
 from .status import show_status
@@ -38,15 +37,6 @@ WARM_UP_FRAMES = 2
 """Before any is timed: Mitsuba compiles in the first, and copies what it keeps."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    threads: tuple[int, ...]
-    repeats: int
-    resolution: int
-    """Pixels along both sides of the frame."""
-    spp: tuple[int, ...]
-
-
 class Renderer(Protocol):
     """A side of the comparison."""
 
@@ -60,7 +50,7 @@ class Renderer(Protocol):
 class FrameBenchmark:
     """All measurements of one scene. Raises BenchError if a side cannot load it."""
 
-    def __init__(self, name: str, path: Path, settings: Settings) -> None:
+    def __init__(self, name: str, path: Path, settings: FrameSettings) -> None:
         self._name = name
         self._settings = settings
         side = settings.resolution

@@ -11,7 +11,8 @@ from ..llvm import LibLlvm
 from . import frames_table
 from .checkout import find_checkout
 from .figures import measure_scenes, new_figures, show
-from .frames import FrameBenchmark, Settings
+from .frame_runs import FrameSettings
+from .frames import FrameBenchmark
 from .machine import machine_record
 from .options import default_cache
 from .scenes import SceneSource, chosen_scenes, scenes_of_rays
@@ -24,7 +25,9 @@ def run(options: argparse.Namespace, library: LibLlvm) -> bool:
     source = find_checkout(options.source)
     scenes = chosen_scenes(options.scenes or USUAL_SCENES, scenes_of_rays(source))
     cache = options.cache or default_cache()
-    settings = Settings(options.threads, options.repeats, options.resolution, options.spp)
+    settings = FrameSettings(
+        options.threads, options.repeats, options.resolution, options.spp
+    )
     machine = {**machine_record(source, None), "llvm": library.name}
     figures = new_figures("frames", machine, asdict(settings))
     show(frames_table.head_lines(machine, figures["settings"]))

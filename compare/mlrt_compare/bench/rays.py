@@ -16,7 +16,7 @@ from mlrt_plugin.threads import thread_count
 from .ats import baselines
 from .build import BACKGROUND, LARGEST_DIFFERENCE
 from .contenders import QUALITIES, embree_device
-from .frame_runs import FrameRun, measured_in_turns
+from .frame_runs import FrameRun, FrameSettings, measured_in_turns
 from .measure import Timing, best, waiting_seconds
 from .native import Native
 from .rays_contenders import (
@@ -40,13 +40,12 @@ TUNING_SECONDS, TUNING_FRAMES = 0.3, 5
 """A variant is tried until it has had either; chosen."""
 
 
+GRIDS = {1: 1, 16: 4}
+"""Rays along both sides of a pixel, by samples."""
+
+
 @dataclass(frozen=True)
-class Settings:
-    threads: tuple[int, ...]
-    repeats: int
-    resolution: int
-    """Pixels along both sides of the frame."""
-    spp: tuple[int, ...]
+class Settings(FrameSettings):
     tiles: tuple[int, ...]
     trace: dict[str, Any]
     """Options of MLRT's tracer, where they are not the usual ones."""
@@ -132,7 +131,7 @@ class RayBenchmark:
         """Figures of each number of samples, kind of rays and number of threads, as JSON
         has them."""
         for spp in self._settings.spp:
-            grid = {1: 1, 16: 4}[spp]
+            grid = GRIDS[spp]
             side = self._settings.resolution
             view = self._module.View(self._scene.view, side, side, grid)
             for shadows in (False, True):
@@ -246,7 +245,7 @@ class RayBenchmark:
         return found
 
     def _traced(self, variant: Variant, view: Any, spp: int, shadows: bool) -> Traced:
-        side = self._settings.resolution * {1: 1, 16: 4}[spp]
+        side = self._settings.resolution * GRIDS[spp]
         primitives = np.zeros((side, side), np.uint32)
         lit = np.zeros((side, side), np.uint8)
         variant.render(view, self._image, primitives=primitives, lit=lit, shadows=shadows)

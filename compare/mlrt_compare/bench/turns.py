@@ -20,29 +20,18 @@ import numpy as np
 from mlrt_plugin.threads import thread_count
 
 from .errors import BenchError
-from .frame_runs import FrameRun, measured_in_turns
+from .frame_runs import FrameRun, FrameSettings, measured_in_turns
 from .measure import Timing, waiting_seconds
 from .native import loaded
-from .rays import ENOUGH_SECONDS, RUN_SECONDS, Traced, difference
+from .rays import ENOUGH_SECONDS, GRIDS, RUN_SECONDS, Traced, difference
 from .scenes import BenchScene
 from .speedup import speedup
 from .status import show_status
 from .table import plural
 
 NEW, BASE = "new", "base"
-GRIDS = {1: 1, 16: 4}
-"""Rays along both sides of a pixel, by samples."""
 TILE = 64
 """Side of tiles in rays; that of which most frames take the least time."""
-
-
-@dataclass(frozen=True)
-class Settings:
-    threads: tuple[int, ...]
-    repeats: int
-    resolution: int
-    """Pixels along both sides of the frame."""
-    spp: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -59,7 +48,7 @@ class Frames:
 class Tracer:
     """A state of MLRT with the tree of a scene, in this process."""
 
-    def __init__(self, library: Path, scene: BenchScene, settings: Settings) -> None:
+    def __init__(self, library: Path, scene: BenchScene, settings: FrameSettings) -> None:
         self._module = loaded(library)
         self._scene = scene
         self._side = settings.resolution
@@ -95,7 +84,9 @@ class Tracer:
         )
 
 
-def serve(pipe: Connection, library: Path, scene: BenchScene, settings: Settings) -> None:
+def serve(
+    pipe: Connection, library: Path, scene: BenchScene, settings: FrameSettings
+) -> None:
     """Answers until there is nobody who asks. What goes wrong is an answer as well."""
     try:
         tracer = Tracer(library, scene, settings)
@@ -112,7 +103,7 @@ class Process:
     """A `Tracer` in a process of its own. Raises BenchError for what goes wrong there."""
 
     def __init__(
-        self, name: str, library: Path, scene: BenchScene, settings: Settings
+        self, name: str, library: Path, scene: BenchScene, settings: FrameSettings
     ) -> None:
         self.name = name
         context = multiprocessing.get_context("spawn")
@@ -161,7 +152,7 @@ class Process:
 
 
 def measure_turns(
-    libraries: dict[str, Path], scene: BenchScene, settings: Settings
+    libraries: dict[str, Path], scene: BenchScene, settings: FrameSettings
 ) -> Iterator[dict[str, Any]]:
     """Figures of each number of samples, kind of rays and number of threads, as JSON has
     them. libraries: of NEW and BASE."""
@@ -188,7 +179,9 @@ def measure_turns(
         show_status("")
 
 
-def timed_block(both: list[Process], frame: Frames, settings: Settings) -> dict[str, Any]:
+def timed_block(
+    both: list[Process], frame: Frames, settings: FrameSettings
+) -> dict[str, Any]:
     first = [process.timing(frame) for process in both]
     counts = [max(1, round(RUN_SECONDS / max(timing.wall, 1e-6))) for timing in first]
 

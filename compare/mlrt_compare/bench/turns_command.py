@@ -9,6 +9,7 @@ from typing import Any
 from .checkout import find_checkout
 from .commits import commit_named, sources_of
 from .figures import measure_scenes, new_figures, show
+from .frame_runs import FrameSettings
 from .machine import machine_record
 from .measure import best
 from .native import compiled_native
@@ -17,7 +18,7 @@ from .rays_table import work
 from .scenes import BenchScene, chosen_scenes, scenes_of_rays
 from .speedup import frame_seconds
 from .table import aligned, machine_lines, number, plural
-from .turns import BASE, NEW, Settings, measure_turns
+from .turns import BASE, NEW, measure_turns
 
 COLUMNS = (
     *("", "base ms", "new ms", "best", "median", "CPU"),
@@ -37,7 +38,9 @@ def run(options: argparse.Namespace) -> bool:
         NEW: new.library,
         BASE: compiled_native(sources_of(source, base, cache), cache).library,
     }
-    settings = Settings(options.threads, options.repeats, options.resolution, options.spp)
+    settings = FrameSettings(
+        options.threads, options.repeats, options.resolution, options.spp
+    )
     figures = new_figures("turns", machine_record(source, new), asdict(settings))
     figures["base"] = base
     show([*machine_lines(figures["machine"]), f"base: {base[:10]}; ratios: base / new"])
