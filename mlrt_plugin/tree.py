@@ -238,7 +238,8 @@ def indices(values: Any, vertex_count: int) -> npt.NDArray[np.uint32]:
 def ray_arrays(
     origins: Any, directions: Any, t_min: Any, t_max: Any
 ) -> tuple[npt.NDArray[np.float32], ...]:
-    """Rays as the native core takes them: (N, 3), (N, 3), (N,) and (N,) float32."""
+    """Rays as the native core takes them: (N, 3) and (N, 3), and both ends of their
+    intervals as (N,), or as (1,) if all have the same, float32."""
     start, along = triples(origins, "origins"), triples(directions, "directions")
     if start.shape != along.shape:
         raise ValueError(
@@ -253,7 +254,5 @@ def ray_arrays(
                 f"{name} must be a number or have the shape ({len(start)},), not "
                 f"{array.shape}"
             )
-        bounds.append(
-            np.ascontiguousarray(np.broadcast_to(single(array, name), (len(start),)))
-        )
+        bounds.append(single(array, name).reshape(-1))
     return start, along, bounds[0], bounds[1]

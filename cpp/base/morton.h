@@ -12,9 +12,10 @@ struct MortonPoint {
     uint32_t column = 0, row = 0;
 };
 
-// Of coordinates below 2^16.
-inline uint32_t morton_code(uint32_t column, uint32_t row) {
-    return drjit::morton_encode(drjit::Array<uint32_t, 2>(column, row));
+// Of coordinates below 2^16, one each or sixteen.
+template <typename UInt>
+UInt morton_code(const UInt &column, const UInt &row) {
+    return drjit::morton_encode(drjit::Array<UInt, 2>(column, row));
 }
 
 inline MortonPoint of_morton_code(uint32_t code) {

@@ -145,6 +145,16 @@ ObjectsHandle make_objects(const Numbers &types, const Maps &frames,
     return {objects};
 }
 
+Vec3f origin_of(const RayGroup &rays, uint32_t i) {
+    if (rays.has_common_origin)
+        return rays.common_origin;
+    return by_axis([&](int k) { return rays.origin[k][i]; });
+}
+
+Vec3f direction_of(const RayGroup &rays, uint32_t i) {
+    return by_axis([&](int k) { return rays.direction[k][i]; });
+}
+
 // Weights of the second and third vertex; the place in its frame for a disk; else zeros.
 Vec2f surface_numbers(const KdTree &tree, const ObjectSet &objects, Vec3f origin,
                       Vec3f direction, float t, uint32_t face, uint32_t number) {
@@ -186,14 +196,16 @@ nb::tuple closest_hit(const ObjectsHandle &self, const TreeHandle &tree,
             trace_closest_objects(
                 objects, group,
                 {t.data() + first, face.data() + first, instance.data() + first}, counters);
-            for (size_t i = first; i < first + group.count; ++i)
+            for (uint32_t ray = 0; ray < group.count; ++ray) {
+                const size_t i = first + ray;
                 if (face[i] != NO_PRIMITIVE) {
-                    const Vec2f uv =
-                        surface_numbers(*tree.tree, objects, rays.origin(i),
-                                        rays.direction(i), t[i], face[i], instance[i]);
+                    const Vec2f uv = surface_numbers(
+                        *tree.tree, objects, origin_of(group, ray),
+                        direction_of(group, ray), t[i], face[i], instance[i]);
                     u[i] = uv.x;
                     v[i] = uv.y;
                 }
+            }
         });
     return nb::make_tuple(to_numpy<float>(std::move(t), {rays.count()}),
                           to_numpy<int32_t>(std::move(face), {rays.count()}),

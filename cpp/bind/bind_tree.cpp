@@ -1,6 +1,4 @@
 // The kd-tree and ray queries on NumPy arrays.
-#include "base/parallel.h"
-#include "base/simd.h"
 #include "bind/arrays.h"
 #include "bind/bind.h"
 #include "bind/build_options.h"
@@ -10,9 +8,9 @@
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
-#include "geometry/triangle_test.h"
 #include "kdtree/lazy.h"
 #include "mlrta/trace_unordered.h"
+#include "traverse/barycentrics.h"
 
 #include <memory>
 #include <mutex>
@@ -47,27 +45,26 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*self.tree, rays, trace_options);
-    std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
-    std::vector<uint32_t> primitive(rays.count());
+    const size_t count = rays.count();
+    auto t = std::make_unique_for_overwrite<float[]>(count);
+    auto primitive = std::make_unique_for_overwrite<int32_t[]>(count);
+    auto u = std::make_unique_for_overwrite<float[]>(count);
+    auto v = std::make_unique_for_overwrite<float[]>(count);
     const Counters counters = rays.for_each_group(
-        unordered_group_size(trace_options, rays.count()),
+        unordered_group_size(trace_options, count),
         [&](size_t first, const RayGroup &group, Counters &c) {
-            trace_closest_unordered(*self.tree, group, trace_options,
-                                    {t.data() + first, primitive.data() + first}, c);
-            for (size_t i = first; i < first + group.count; ++i)
-                if (primitive[i] != NO_PRIMITIVE) {
-                    const Vec2f uv = barycentrics(rays.origin(i), rays.direction(i),
-                                                  self.tree->triangles[primitive[i]]);
-                    u[i] = uv.x;
-                    v[i] = uv.y;
-                }
+            // The mark of a miss, 2^32 - 1, is -1 as a signed number.
+            const HitGroup hits{t.get() + first,
+                                reinterpret_cast<uint32_t *>(primitive.get() + first)};
+            trace_closest_unordered(*self.tree, group, trace_options, hits, c);
+            find_barycentrics(*self.tree, group, hits.primitive, u.get() + first,
+                              v.get() + first);
         });
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::make_tuple(to_numpy<float>(std::move(t), {rays.count()}),
-                          to_numpy<int32_t>(std::move(primitive), {rays.count()}),
-                          to_numpy<float>(std::move(u), {rays.count()}),
-                          to_numpy<float>(std::move(v), {rays.count()}));
+    return nb::make_tuple(to_numpy(std::move(t), {count}),
+                          to_numpy(std::move(primitive), {count}),
+                          to_numpy(std::move(u), {count}), to_numpy(std::move(v), {count}));
 }
 
 nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &directions,

@@ -21,14 +21,14 @@ namespace {
 // before all are sorted; chosen.
 constexpr float WIDER = 2;
 
-// Cells along the longer side of the plane, as bits.
-constexpr uint32_t CELL_BITS = 10;
+// Cells along the longer side of the plane, as bits; of all of them, and of a ray's number.
+constexpr uint32_t SIDE_BITS = 8, CELL_BITS = 2 * SIDE_BITS, NUMBER_BITS = 16;
+static_assert(RayOrder::MOST_RAYS <= 1u << NUMBER_BITS && CELL_BITS + NUMBER_BITS == 32);
 
 // Bits of a cell's number to leave out, so that a cell holds about SHARING rays.
 uint32_t dropped_bits(uint32_t count) {
     constexpr uint32_t SHARING = 64; // chosen from 4, 16 and 256 by area lights and skies
-    return 2 * CELL_BITS -
-           std::min<uint32_t>(std::bit_width(count / SHARING), 2 * CELL_BITS);
+    return CELL_BITS - std::min<uint32_t>(std::bit_width(count / SHARING), CELL_BITS);
 }
 
 // The rectangle around points, lane by lane.
@@ -113,30 +113,41 @@ bool RayOrder::is_scattered() const {
     return sides / runs > WIDER * 2 * square_side;
 }
 
-// A counting sort in steps of ten bits each, lower ones first: two, or one if there are no
-// more bits.
+// A counting sort in two steps, by the lower and by the upper half of the bits of cells.
 void RayOrder::sort(uint32_t dropped_bits) {
-    constexpr uint32_t CELLS = 1u << CELL_BITS;
-    const float side = std::max(width_, height_);
-    const float scale = side > 0 ? float(CELLS - 1) / side : 0;
-    std::vector<uint32_t> codes(count_), half_sorted(count_);
+    constexpr uint32_t DIGITS = 1u << SIDE_BITS;
+    constexpr std::array<uint32_t, 2> SHIFTS{NUMBER_BITS, NUMBER_BITS + SIDE_BITS};
+    const auto digit = [](uint32_t key, uint32_t shift) {
+        return key >> shift & (DIGITS - 1);
+    };
+    // Cells above numbers of rays, so that a step reads one array, and in its order.
+    std::vector<uint32_t> keys = cells_and_numbers(dropped_bits);
+    std::array<std::array<uint32_t, DIGITS>, 2> next{};
     for (uint32_t i = 0; i < count_; ++i)
-        codes[i] = morton_code(uint32_t(int((x_[i] - left_) * scale)),
-                               uint32_t(int((y_[i] - top_) * scale))) >>
-                   dropped_bits;
+        for (size_t step = 0; step < 2; ++step)
+            ++next[step][digit(keys[i], SHIFTS[step])];
+    for (auto &first : next)
+        std::exclusive_scan(first.begin(), first.end(), first.begin(), 0u);
+    std::vector<uint32_t> half_sorted(count_);
+    for (uint32_t i = 0; i < count_; ++i)
+        half_sorted[next[0][digit(keys[i], SHIFTS[0])]++] = keys[i];
     numbers_.resize(count_);
-    std::iota(numbers_.begin(), numbers_.end(), 0u);
-    for (uint32_t shift = 0; shift < 2 * CELL_BITS - dropped_bits; shift += CELL_BITS) {
-        const auto digit = [&](uint32_t ray) { return codes[ray] >> shift & (CELLS - 1); };
-        std::array<uint32_t, CELLS + 1> next{};
-        for (const uint32_t ray : numbers_)
-            ++next[digit(ray) + 1];
-        for (uint32_t i = 0; i < CELLS; ++i)
-            next[i + 1] += next[i];
-        for (const uint32_t ray : numbers_)
-            half_sorted[next[digit(ray)]++] = ray;
-        numbers_.swap(half_sorted);
+    for (const uint32_t key : half_sorted)
+        numbers_[next[1][digit(key, SHIFTS[1])]++] = key & ((1u << NUMBER_BITS) - 1);
+}
+
+// The number of the cell of each ray, without its lowest bits, above that of the ray.
+std::vector<uint32_t> RayOrder::cells_and_numbers(uint32_t dropped_bits) const {
+    const float side = std::max(width_, height_);
+    const FloatPacket scale = side > 0 ? float((1u << SIDE_BITS) - 1) / side : 0.0f;
+    std::vector<uint32_t> keys(x_.size());
+    for (uint32_t i = 0; i < count_; i += PACKET_WIDTH) {
+        const UIntPacket column((load<FloatPacket>(&x_[i]) - left_) * scale);
+        const UIntPacket row((load<FloatPacket>(&y_[i]) - top_) * scale);
+        const UIntPacket cell = morton_code(column, row) >> dropped_bits;
+        store(&keys[i], cell << NUMBER_BITS | (lane_indices() + i));
     }
+    return keys;
 }
 
 } // namespace mlrt

@@ -32,6 +32,7 @@ private:
     void map_to_plane(const RayGroup &rays);
     bool is_scattered() const;
     void sort(uint32_t dropped_bits);
+    std::vector<uint32_t> cells_and_numbers(uint32_t dropped_bits) const;
 
     uint32_t count_ = 0;
     std::vector<float> x_, y_; // of each ray in the plane, in whole packets
