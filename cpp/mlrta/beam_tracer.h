@@ -267,11 +267,10 @@ private:
                          bool ordered) {
         counters_.regrouped_rays += numbers.count;
         RegroupedRays part(rays_, numbers);
-        const RayGroup group = part.group(rays_);
         typename Output::Buffer buffer;
         Output output = output_.into(buffer);
         output.clear(part.count);
-        BeamTracer(tree_, group, options_, nullptr, output, counters_, memory_,
+        BeamTracer(tree_, part.group, options_, nullptr, output, counters_, memory_,
                    regroupings_ + 1)
             .trace_beam(0, part.count, frontier, ordered);
         output_.set(part, buffer);

@@ -134,41 +134,16 @@ RayNumbers Occupancy::sorted(const BeamPackets &beam) const {
 
 RegroupedRays::RegroupedRays(const RayGroup &rays, const RayNumbers &numbers)
     : count(numbers.count) {
-    for (uint32_t i = 0; i < count; i += PACKET_WIDTH) {
-        // What lies behind the last one is not read, but must be a ray.
-        const LaneBits lanes = first_lanes(count - i);
-        const UIntPacket from =
-            select(from_bits<UIntPacket>(lanes), load<UIntPacket>(&numbers.number[i]),
-                   UIntPacket(numbers.number[0]));
-        for (int k = 0; k < 3; ++k)
-            store(&direction[k][i], gather(rays.direction[k], from));
-        for (int k = 0; k < 3 && !rays.has_common_origin; ++k)
-            store(&origin[k][i], gather(rays.origin[k], from));
-        if (rays.t_min.each())
-            store(&t_min[i], gather(rays.t_min.each(), from));
-        if (rays.t_max.each())
-            store(&t_max[i], gather(rays.t_max.each(), from));
-        store(&number[i], from);
-    }
-}
-
-RayGroup RegroupedRays::group(const RayGroup &from) {
-    RayGroup group = from;
-    group.count = count;
-    for (int k = 0; k < 3; ++k) {
-        group.direction[k] = direction[k].data();
-        if (!from.has_common_origin)
-            group.origin[k] = origin[k].data();
-    }
-    if (from.t_min.each())
-        group.t_min = IntervalEnds(t_min.data());
-    if (from.t_max.each())
-        group.t_max = IntervalEnds(t_max.data());
-    if (from.cost) {
+    std::copy_n(numbers.number.begin(), count, number.begin());
+    group = copy_rays(rays, {number.data(), count},
+                      {{origin[0].data(), origin[1].data(), origin[2].data()},
+                       {direction[0].data(), direction[1].data(), direction[2].data()},
+                       t_min.data(),
+                       t_max.data()});
+    if (rays.cost) {
         std::fill_n(cost.begin(), count, 0.0f);
         group.cost = cost.data();
     }
-    return group;
 }
 
 void RegroupedRays::add_cost_to(const RayGroup &from) const {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mlrta/beam_packets.h"
+#include "mlrta/ray_copies.h"
 
 #include <array>
 #include <cstdint>
@@ -66,11 +67,11 @@ struct RegroupedRays {
     std::array<float, RayNumbers::CAPACITY> cost;
     std::array<uint32_t, RayNumbers::CAPACITY> number;
     uint32_t count;
+    RayGroup group; // they alone
 
     RegroupedRays(const RayGroup &rays, const RayNumbers &numbers);
-
-    // They alone, with the common origin of the group that they are from, if it has one.
-    RayGroup group(const RayGroup &from);
+    RegroupedRays(const RegroupedRays &) = delete;
+    RegroupedRays &operator=(const RegroupedRays &) = delete;
 
     // What they took, if the group that they are from keeps account of it.
     void add_cost_to(const RayGroup &from) const;

@@ -1,10 +1,13 @@
 #include "mlrta/trace_unordered.h"
 
+#include "base/simd.h"
 #include "mlrta/parallel_rays.h"
+#include "mlrta/ray_copies.h"
 #include "mlrta/ray_order.h"
 #include "mlrta/shaft_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -19,46 +22,38 @@ bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
 }
 
 template <typename Value>
-std::vector<Value> in_order(const std::vector<uint32_t> &numbers, const Value *values) {
-    std::vector<Value> ordered(numbers.size());
-    for (size_t i = 0; i < numbers.size(); ++i)
-        ordered[i] = values[numbers[i]];
-    return ordered;
-}
-
-template <typename Value>
 void put_back(const std::vector<uint32_t> &numbers, const std::vector<Value> &ordered,
               Value *values) {
     for (size_t i = 0; i < numbers.size(); ++i)
         values[numbers[i]] = ordered[i];
 }
 
-// Copies of rays of a group in an order of their own.
-struct OrderedRays {
-    std::vector<float> origin[3], direction[3], t_min, t_max;
-    RayGroup group;
-
-    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers) : group(rays) {
-        group.count = uint32_t(numbers.size());
-        for (int k = 0; k < 3; ++k) {
-            direction[k] = in_order(numbers, rays.direction[k]);
-            group.direction[k] = direction[k].data();
-            if (!rays.has_common_origin) {
-                origin[k] = in_order(numbers, rays.origin[k]);
-                group.origin[k] = origin[k].data();
-            }
-        }
-        if (rays.t_min.each()) {
-            t_min = in_order(numbers, rays.t_min.each());
-            group.t_min = IntervalEnds(t_min.data());
-        }
-        if (rays.t_max.each()) {
-            t_max = in_order(numbers, rays.t_max.each());
-            group.t_max = IntervalEnds(t_max.data());
-        }
+// Rays of a group in an order of their own.
+class OrderedRays {
+public:
+    OrderedRays(const RayGroup &rays, const std::vector<uint32_t> &numbers) {
+        const size_t room =
+            (numbers.size() + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
+        const auto column = [&](size_t number, bool needed) {
+            if (needed)
+                columns_[number].resize(room);
+            return columns_[number].data();
+        };
+        const bool origins = !rays.has_common_origin;
+        group_ = copy_rays(rays, numbers,
+                           {{column(0, origins), column(1, origins), column(2, origins)},
+                            {column(3, true), column(4, true), column(5, true)},
+                            column(6, rays.t_min.each() != nullptr),
+                            column(7, rays.t_max.each() != nullptr)});
     }
     OrderedRays(const OrderedRays &) = delete;
     OrderedRays &operator=(const OrderedRays &) = delete;
+
+    const RayGroup &group() const { return group_; }
+
+private:
+    std::array<std::vector<float>, 8> columns_;
+    RayGroup group_;
 };
 
 void trace_any_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
@@ -70,7 +65,7 @@ void trace_any_sorted(const KdTree &tree, const RayGroup &rays, const TraceOptio
     }
     const OrderedRays ordered(rays, order.numbers());
     std::vector<uint8_t> found(rays.count);
-    trace_any(tree, ordered.group, options, found.data(), counters);
+    trace_any(tree, ordered.group(), options, found.data(), counters);
     put_back(order.numbers(), found, occluded);
 }
 
@@ -97,7 +92,7 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
     const OrderedRays ordered(rays, numbers);
     std::vector<float> t(hits.t ? rays.count : 0);
     std::vector<uint32_t> primitive(rays.count);
-    trace_closest(tree, ordered.group, options,
+    trace_closest(tree, ordered.group(), options,
                   {hits.t ? t.data() : nullptr, primitive.data()}, counters);
     if (hits.t)
         put_back(numbers, t, hits.t);
@@ -124,7 +119,7 @@ void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
         return;
     const OrderedRays others(rays, left);
     std::vector<uint8_t> found(left.size());
-    trace_any_sorted(tree, others.group, options, found.data(), counters);
+    trace_any_sorted(tree, others.group(), options, found.data(), counters);
     put_back(left, found, occluded);
 }
 
