@@ -6,6 +6,7 @@
 // nothing but tracing.
 #pragma once
 
+#include "base/fused_dot.h"
 #include "base/morton.h"
 #include "base/parallel.h"
 #include "base/reciprocal_estimate.h"
@@ -142,16 +143,14 @@ struct Shading {
 // `normal` need not have unit length; `t` is finite in all lanes.
 inline Shading shade(const View &view, const Vec3<FloatPacket> &direction,
                      const FloatPacket &t, const Vec3<FloatPacket> &normal) {
-    const auto product = [](const Vec3<FloatPacket> &a, const Vec3<FloatPacket> &b) {
-        return fused(a.x, b.x, fused(a.y, b.y, a.z * b.z));
-    };
     const Vec3f offset = view.camera.origin - view.light;
     Shading result;
     result.from_light =
         by_axis([&](int k) { return fused(t, direction[k], FloatPacket(offset[k])); });
-    result.cosine = absolute(product(normal, result.from_light)) *
-                    reciprocal_root_estimate(product(normal, normal) *
-                                             product(result.from_light, result.from_light));
+    result.cosine =
+        absolute(fused_dot(normal, result.from_light)) *
+        reciprocal_root_estimate(fused_dot(normal, normal) *
+                                 fused_dot(result.from_light, result.from_light));
     return result;
 }
 

@@ -50,23 +50,25 @@ std::vector<float> sampler_stream(uint32_t seed, uint32_t pixel_count, uint32_t 
     return numbers;
 }
 
-// Of sixteen streams, what each draws: 2 numbers, 1 number, or one that is dropped for 0.
+// Of whole packets of streams, what each draws: 2 numbers, 1 number, or one that is dropped
+// for 0.
 std::vector<std::vector<float>> packet_streams(const std::vector<uint32_t> &seeds,
                                                const std::vector<uint32_t> &indices,
                                                const std::vector<int> &drawn) {
-    std::vector<LaneArray<float>> x(drawn.size()), y(drawn.size());
+    const size_t count = seeds.size();
+    std::vector<std::vector<float>> x(drawn.size(), std::vector<float>(count)), y = x;
     std::vector<NumberPair> pairs;
     for (size_t i = 0; i < drawn.size(); ++i)
         pairs.push_back(
             {drawn[i] > 0 ? x[i].data() : nullptr, drawn[i] > 1 ? y[i].data() : nullptr});
-    draw_numbers(seeds.data(), indices.data(), PACKET_WIDTH, pairs);
-    std::vector<std::vector<float>> numbers(PACKET_WIDTH);
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+    draw_numbers(seeds.data(), indices.data(), count, pairs);
+    std::vector<std::vector<float>> numbers(count);
+    for (size_t stream = 0; stream < count; ++stream)
         for (size_t i = 0; i < drawn.size(); ++i) {
             if (drawn[i] > 0)
-                numbers[lane].push_back(x[i][lane]);
+                numbers[stream].push_back(x[i][stream]);
             if (drawn[i] > 1)
-                numbers[lane].push_back(y[i][lane]);
+                numbers[stream].push_back(y[i][stream]);
         }
     return numbers;
 }

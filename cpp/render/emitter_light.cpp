@@ -94,22 +94,10 @@ void TileRenderer::choose_light(ShadedPacket &packet, uint32_t sample) {
 // Of the emitters that the lanes chose, whichever they are.
 void TileRenderer::sample_lights(ShadedPacket &packet, const FloatPacket &y) {
     const EmitterChoices &choices = packet.choices;
-    const auto light_of = [&](uint32_t emitter) {
-        return sample_chosen(scene_, emitter, choices, packet.point.p, y);
-    };
-    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(packet.lanes)));
-    new (&packet.light) EmitterSample<FloatPacket>(light_of(first));
-    const LaneBits others = packet.lanes & ~to_bits(choices.emitter == UIntPacket(first));
-    for_each_value(choices.emitter, others, [&](uint32_t emitter, LaneBits holders) {
-        const EmitterSample<FloatPacket> light = light_of(emitter);
-        const auto mask = from_bits<FloatPacket>(holders);
-        for (int k = 0; k < 3; ++k) {
-            packet.light.weight[k] = select(mask, light.weight[k], packet.light.weight[k]);
-            packet.light.direction[k] =
-                select(mask, light.direction[k], packet.light.direction[k]);
-            packet.light.target[k] = select(mask, light.target[k], packet.light.target[k]);
-        }
-    });
+    new (&packet.light) EmitterSample<FloatPacket>(
+        light_of_chosen(choices.emitter, packet.lanes, [&](uint32_t emitter) {
+            return sample_chosen(scene_, emitter, choices, packet.point.p, y);
+        }));
 }
 
 void TileRenderer::add_emitter_sample(const ShadedPacket &packet, uint32_t sample) {

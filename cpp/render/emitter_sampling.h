@@ -58,8 +58,33 @@ EmitterSample<FloatPacket> sample_chosen(const PreparedScene &scene, uint32_t em
                                          const Vec3<FloatPacket> &p, const FloatPacket &y,
                                          FloatPacket *density = nullptr);
 
-// The same for a scene whose emitters are all points, of all that are chosen in the given
-// lanes, of which there must be one: each lane gets light of its own.
+// Takes over the given lanes of light of another emitter; not where it lies on.
+template <typename Light>
+void set_lanes(Light &light, LaneBits lanes, const Light &other) {
+    const auto mask = from_bits<FloatPacket>(lanes);
+    for (int k = 0; k < 3; ++k) {
+        light.weight[k] = select(mask, other.weight[k], light.weight[k]);
+        light.direction[k] = select(mask, other.direction[k], light.direction[k]);
+        light.target[k] = select(mask, other.target[k], light.target[k]);
+    }
+}
+
+// Light of the emitters that the given lanes chose, of which there must be one:
+// light_of(emitter) is that of one emitter in all lanes, an EmitterSample or its parts of
+// the same names. Where it lies on is that of any.
+template <typename LightOf>
+auto light_of_chosen(const UIntPacket &emitters, LaneBits lanes, LightOf &&light_of) {
+    const uint32_t first = lane_of(emitters, uint32_t(__builtin_ctz(lanes)));
+    auto light = light_of(first);
+    for_each_value(emitters, lanes & ~to_bits(emitters == UIntPacket(first)),
+                   [&](uint32_t emitter, LaneBits holders) {
+                       set_lanes(light, holders, light_of(emitter));
+                   });
+    return light;
+}
+
+// sample_chosen() for a scene whose emitters are all points, of all that are chosen in the
+// given lanes, of which there must be one: each lane gets light of its own.
 EmitterSample<FloatPacket> sample_chosen_points(const PreparedScene &scene,
                                                 const EmitterChoices &choices,
                                                 LaneBits lanes, const Vec3<FloatPacket> &p);

@@ -4,9 +4,11 @@
 #include "base/word_pairs.h"
 #include "render/sampler.h"
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 namespace mlrt {
 
@@ -49,16 +51,29 @@ private:
 // The numbers of samples, of whole packets, pair by pair.
 inline void draw_numbers(const uint32_t *seeds, const uint32_t *indices, size_t count,
                          std::span<const NumberPair> pairs) {
-    for (size_t i = 0; i < count; i += PACKET_WIDTH) {
-        Pcg32Packet random(load<UIntPacket>(seeds + i), load<UIntPacket>(indices + i));
+    size_t i = 0;
+    // So many packets at a time: one is a chain of operations that wait for each other.
+    const auto draw = [&]<size_t... Packets>(std::index_sequence<Packets...>) {
+        constexpr size_t COUNT = sizeof...(Packets);
+        std::array<Pcg32Packet, COUNT> random{
+            Pcg32Packet(load<UIntPacket>(seeds + i + Packets * PACKET_WIDTH),
+                        load<UIntPacket>(indices + i + Packets * PACKET_WIDTH))...};
+        const auto write = [&](float *numbers) {
+            const std::array<FloatPacket, COUNT> next{random[Packets].next_float()...};
+            if (numbers)
+                (store(numbers + i + Packets * PACKET_WIDTH, next[Packets]), ...);
+        };
         for (const NumberPair &pair : pairs) {
-            const FloatPacket number = random.next_float();
-            if (pair.x)
-                store(pair.x + i, number);
+            write(pair.x);
             if (pair.y)
-                store(pair.y + i, random.next_float());
+                write(pair.y);
         }
-    }
+        i += COUNT * PACKET_WIDTH;
+    };
+    while (i + PACKET_WIDTH < count)
+        draw(std::make_index_sequence<2>());
+    if (i < count)
+        draw(std::make_index_sequence<1>());
 }
 
 } // namespace mlrt

@@ -56,15 +56,6 @@ from_emitter(const PreparedScene &scene, uint32_t number, const EmitterChoices &
     return {light.weight, light.direction, light.target};
 }
 
-void set_lanes(PlainLight &light, LaneBits lanes, const PlainLight &other) {
-    const auto mask = from_bits<FloatPacket>(lanes);
-    for (int k = 0; k < 3; ++k) {
-        light.weight[k] = select(mask, other.weight[k], light.weight[k]);
-        light.direction[k] = select(mask, other.direction[k], light.direction[k]);
-        light.target[k] = select(mask, other.target[k], light.target[k]);
-    }
-}
-
 // Of the emitters that the given lanes chose.
 PlainLight from_chosen(const PreparedScene &scene, const EmitterChoices &choices,
                        LaneBits lanes, const Vec3<FloatPacket> &p, const FloatPacket &y) {
@@ -73,14 +64,9 @@ PlainLight from_chosen(const PreparedScene &scene, const EmitterChoices &choices
             sample_chosen_points(scene, choices, lanes, p);
         return {light.weight, light.direction, light.target};
     }
-    const uint32_t first = lane_of(choices.emitter, uint32_t(__builtin_ctz(lanes)));
-    PlainLight light = from_emitter(scene, first, choices, p, y);
-    for_each_value(choices.emitter, lanes & ~to_bits(choices.emitter == UIntPacket(first)),
-                   [&](uint32_t number, LaneBits holders) {
-                       set_lanes(light, holders,
-                                 from_emitter(scene, number, choices, p, y));
-                   });
-    return light;
+    return light_of_chosen(choices.emitter, lanes, [&](uint32_t number) {
+        return from_emitter(scene, number, choices, p, y);
+    });
 }
 
 } // namespace

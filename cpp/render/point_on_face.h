@@ -2,6 +2,7 @@
 // for one ray and for sixteen.
 #pragma once
 
+#include "base/fused_dot.h"
 #include "base/simd.h"
 #include "render/face_cache.h"
 #include "render/surface.h"
@@ -15,11 +16,6 @@ Vec3<Real> interpolate(const Corners<Part> &v, const Real &wa, const Real &wb,
     return by_axis([&](int k) {
         return fused(Real(v.a[k]), wa, fused(Real(v.b[k]), wb, Real(v.c[k]) * wc));
     });
-}
-
-template <typename Real, typename Part>
-Real fused_dot(const Vec3<Real> &a, const Vec3<Part> &b) {
-    return fused(a.x, Real(b.x), fused(a.y, Real(b.y), a.z * Real(b.z)));
 }
 
 // What the direction of a ray is multiplied by, of a WeightForm, times the direction.

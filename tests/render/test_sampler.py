@@ -44,7 +44,7 @@ def test_against_scalar_pcg32_and_tea(seed: int, samples: int) -> None:
 @pytest.mark.parametrize("drawn", [[2], [2, 1], [2, 0, 2], [0, 1, 2, 2, 2, 1]], ids=str)
 def test_packets_against_scalar_pcg32(drawn: list[int]) -> None:
     random = np.random.default_rng(3)
-    seeds, indices = random.integers(0, 1 << 32, (2, 16), dtype=np.uint64).tolist()
+    seeds, indices = random.integers(0, 1 << 32, (2, 16 * 5), dtype=np.uint64).tolist()
     seeds[:2], indices[:2] = [0, 0xFFFFFFFF], [0xFFFFFFFF, 0]
     expected = []
     for seed, index in zip(seeds, indices, strict=True):
