@@ -122,7 +122,9 @@ private:
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
         const BeamBudget budget =
-            count > LARGE_BEAM ? BeamBudget(MOST_OF_HUGE_BEAM) : budget_of(active);
+            count > LARGE_BEAM ? BeamBudget(MOST_OF_HUGE_BEAM, FIRST_LOOK_AT_HUGE_BEAM,
+                                            LEAST_YIELD_OF_HUGE_BEAM)
+                               : budget_of(active);
         const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
                                                          budget, beam, counters_);
         if (const float share = cost.share(active); share > 0)
@@ -307,10 +309,13 @@ private:
     static constexpr uint32_t MOST_TRIANGLES_PER_RAY =
         Output::query == Query::any ? 24 : 96;
 
-    // What a huge beam may test before it is divided: where triangles are small, the nearer
-    // ones of them leave more to be tested than smaller beams would. Chosen from 60 to 500
-    // by frames of all of these at 1 and 16 rays a pixel.
-    static constexpr uint32_t MOST_OF_HUGE_BEAM = 120;
+    // What a huge beam may test before it is divided, at which triangle it is first looked
+    // at what it finds, and how many rays a triangle should have found something then:
+    // where triangles are small, the nearer ones of them leave more to be tested than
+    // smaller beams would. Chosen from 40 to 500, from 30 to 80 and from 20 to 60 or none,
+    // by what tracing takes in office, conference, sponza and building.
+    static constexpr uint32_t MOST_OF_HUGE_BEAM = 160, FIRST_LOOK_AT_HUGE_BEAM = 60;
+    static constexpr float LEAST_YIELD_OF_HUGE_BEAM = 30;
 
     // The same where there is the wide tree, which takes less time then. Beams that meet
     // more than DENSE triangles a ray had better not be tried, those that meet less than
