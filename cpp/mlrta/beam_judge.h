@@ -81,13 +81,24 @@ public:
             leaf.reference_count() > MOST_COVER_TESTS)
             return;
         for (const uint32_t primitive : tree_.references_of(leaf))
-            if (const auto t = covered_until(beam_, tree_.triangles[primitive]);
-                t && *t < t_max_) {
-                ++counters_.blockers;
-                t_max_ = *t;
-                frustum_.shorten(t_max_);
-            }
+            try_blocker(primitive);
     }
+
+    // Lets the beam end at a triangle if that covers it.
+    void try_blocker(uint32_t primitive) {
+        if (!covering_triangles_)
+            return;
+        if (const auto t = covered_until(beam_, tree_.triangles[primitive]);
+            t && *t < t_max_) {
+            ++counters_.blockers;
+            t_max_ = *t;
+            blocker_ = primitive;
+            frustum_.shorten(t_max_);
+        }
+    }
+
+    // The triangle that the beam ends at, if one was found to cover it.
+    uint32_t blocker() const { return blocker_; }
 
 private:
     // In leaves with more triangles single ones are too small.
@@ -101,6 +112,7 @@ private:
     bool covering_triangles_;
     Counters &counters_;
     double t_max_;
+    uint32_t blocker_ = NO_PRIMITIVE;
 };
 
 } // namespace mlrt

@@ -6,6 +6,7 @@
 #include "mlrta/parallel_rays.h"
 #include "mlrta/ray_cost.h"
 #include "mlrta/tile.h"
+#include "traverse/load_packet.h"
 
 #include <algorithm>
 #include <limits>
@@ -19,13 +20,13 @@ namespace {
 //
 // Runs is what traces them: void trace(first, count, frontier), with the tiles and frontier
 // that are usual for it.
-template <typename Runs>
+template <typename Runs, typename Output>
 class TileTracer {
 public:
     TileTracer(const KdTree &tree, const RayGroup &rays, const TraceOptions &options,
-               const CameraRays *camera, Runs &runs, Counters &counters)
+               const CameraRays *camera, Runs &runs, Output &output, Counters &counters)
         : tree_(tree), rays_(rays), options_(options), camera_(camera), runs_(runs),
-          counters_(counters),
+          output_(output), counters_(counters),
           minimum_tile_(options.minimum_tile ? options.minimum_tile : Runs::MINIMUM_TILE),
           most_entries_(options.frontier ? options.frontier : Runs::FRONTIER) {}
 
@@ -56,10 +57,22 @@ private:
         beam.t_max = std::min(beam.t_max, t_end);
         BeamJudge judge(tree_, beam, options_, counters_);
         counters_.fallbacks += !judge.knows(parent.entries[0].cell);
+        if (Output::query == Query::any) {
+            // Neighbouring tiles are often covered by the same triangle.
+            const uint32_t last = blocker_of_thread(tree_);
+            if (last < tree_.triangles.size())
+                judge.try_blocker(last);
+            if (stopped_by_blocker(first, count, judge)) {
+                cost.add_to_run(first, count);
+                return;
+            }
+        }
         const Frontier frontier =
             search_frontier({tree_.nodes.data(), tree_.nodes.capacity()}, parent,
                             most_entries_, judge, options_.search_order);
         cost.add_to_run(first, count);
+        if (stopped_by_blocker(first, count, judge))
+            return;
         if (frontier.count == 0) {
             ++counters_.missed_tiles;
             return;
@@ -76,11 +89,62 @@ private:
         });
     }
 
+    // Whether a triangle stops all rays of the tile, of Query::any: it answers them then.
+    bool stopped_by_blocker(uint32_t first, uint32_t count, const BeamJudge &judge) {
+        if constexpr (Output::query == Query::any) {
+            if (!judge.found_blocker() || !(judge.t_max() <= first_end(first, count)))
+                return false;
+            blocker_of_thread(tree_) = judge.blocker();
+            for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
+                output_.set(i, active_rays(i, first + count));
+            return true;
+        }
+        return false;
+    }
+
+    // The smallest t_max of active rays.
+    float first_end(uint32_t first, uint32_t count) const {
+        if (!rays_.t_max.each())
+            return rays_.t_max.common();
+        float end = std::numeric_limits<float>::infinity();
+        for (uint32_t i = first; i < first + count; ++i)
+            if (rays_.t_min[i] < rays_.t_max[i])
+                end = std::min(end, rays_.t_max[i]);
+        return end;
+    }
+
+    // Of up to sixteen rays from `first` on.
+    LaneBits active_rays(uint32_t first, uint32_t last) const {
+        FloatPacket largest = 0.0f;
+        auto active =
+            load_padded(rays_.t_min, first, last) < load_padded(rays_.t_max, first, last);
+        for (const float *direction : rays_.direction) {
+            const FloatPacket size = absolute(load_padded(direction, first, last));
+            active &= size < std::numeric_limits<float>::infinity();
+            largest = maximum(size, largest);
+        }
+        return to_bits(active & (largest > 0.0f));
+    }
+
+    // The last triangle that stopped all rays of a tile in the scene that this thread
+    // traced; another scene may have taken its place.
+    static uint32_t &blocker_of_thread(const KdTree &tree) {
+        struct Known {
+            const KdTree *scene = nullptr;
+            uint32_t blocker = NO_PRIMITIVE;
+        };
+        thread_local Known known;
+        if (known.scene != &tree)
+            known = {&tree, NO_PRIMITIVE};
+        return known.blocker;
+    }
+
     const KdTree &tree_;
     const RayGroup &rays_;
     const TraceOptions &options_;
     const CameraRays *camera_;
     Runs &runs_;
+    Output &output_;
     Counters &counters_;
     uint32_t minimum_tile_, most_entries_;
 };
@@ -112,7 +176,7 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &a
     if (tile)
         camera = camera_rays(rays, *tile);
     const auto trace_runs = [&](auto runs) {
-        TileTracer(tree, rays, options, camera ? &*camera : nullptr, runs, counters)
+        TileTracer(tree, rays, options, camera ? &*camera : nullptr, runs, output, counters)
             .trace();
     };
     output.clear(rays.count);

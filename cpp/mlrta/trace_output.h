@@ -81,7 +81,10 @@ struct AnyOutput {
         set(first, lanes & state.hits.found);
     }
     void set(uint32_t first, LaneBits lanes) {
-        for_each_lane(lanes, [&](uint32_t lane) { occluded[first + lane] = 1; });
+        if (lanes == ALL_LANES)
+            std::fill_n(occluded + first, PACKET_WIDTH, uint8_t(1));
+        else
+            for_each_lane(lanes, [&](uint32_t lane) { occluded[first + lane] = 1; });
     }
 
     struct Buffer {

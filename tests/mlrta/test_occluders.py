@@ -18,6 +18,12 @@ SEED = 2718
 Corners = tuple[tuple[float, float, float], ...]
 
 SMALL_TILES: Options = {"initial_tile": 16, "minimum_tile": 4}
+SHADOW_WAYS: tuple[Options, ...] = (
+    {},
+    SMALL_TILES,
+    {**SMALL_TILES, "traversal": "packet"},
+    {**SMALL_TILES, "traversal": "interval"},
+)
 
 
 def corners(vertices: npt.ArrayLike) -> Corners:
@@ -177,3 +183,41 @@ def test_camera_in_a_closed_room(core: ModuleType) -> None:
             np.testing.assert_array_equal(found[1].view(np.int32), expected.face)
             assert (counters["blockers"] > 20) == covering
             assert occluded(tree, rays, options).all()
+
+
+@each_core
+@pytest.mark.parametrize("case", ["beyond", "all ends", "some before", "some inactive"])
+def test_any_hits_of_tiles_that_one_triangle_covers(core: ModuleType, case: str) -> None:
+    """A tile is answered as a whole only if the triangle lies in all rays' intervals."""
+    rng = np.random.default_rng(SEED)
+    # Two walls that cover the view: one after the other stops tiles of the same thread.
+    grid = np.linspace(-0.25, 0.25, 64)
+    directions = np.float32([(x, y, 1) for y in grid for x in grid])
+    rays = np.full_like(directions, 0.125), directions
+    for depth in (2.0, 5.0):
+        wall = np.float32([(-9, -9, depth), (9, -9, depth + 1), (0, 27, depth - 1)])
+        pieces, faces = workloads.soup(rng, 30, 0.2)
+        vertices = np.concatenate([wall, pieces + np.float32((0, 0, depth + 4))])
+        tree = build(
+            core, (vertices, np.concatenate([np.uint32([[0, 1, 2]]), faces + np.uint32(3)]))
+        )
+        at_wall = closest(tree, rays, BRUTE_FORCE).t
+        t_min = np.zeros(len(directions), np.float32)
+        t_max = np.full(len(directions), np.inf, np.float32)
+        one = rng.integers(len(directions), size=5)
+        if case == "all ends":
+            t_max = at_wall.copy()
+        elif case == "some before":
+            t_max[one] = np.nextafter(at_wall[one], np.float32(0))
+        elif case == "some inactive":
+            t_max[one] = 0
+            rays[1][one[0]] = np.nan
+        expected = occluded(tree, rays, BRUTE_FORCE, t_min, t_max)
+        assert expected.mean() > 0.99
+        for options in (*SHADOW_WAYS, {**SMALL_TILES, "covering_triangles": False}):
+            counters: dict[str, int] = {}
+            ends = interval(rays, t_min, t_max)
+            found = np.asarray(tree.any_hit(*rays, *ends, options, counters), bool)
+            np.testing.assert_array_equal(found, expected, err_msg=str((SEED, options)))
+            if case == "beyond" and options.get("covering_triangles", True):
+                assert counters["blockers"] > 0 and counters["beams"] == 0
