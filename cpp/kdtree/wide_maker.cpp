@@ -4,6 +4,7 @@
 #include "base/denormals.h"
 #include "base/parallel.h"
 #include "geometry/clip.h"
+#include "kdtree/fragment_list.h"
 #include "kdtree/interruption.h"
 #include "kdtree/lazy.h"
 #include "kdtree/reference.h"
@@ -11,6 +12,7 @@
 #include "kdtree/wide_part.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <limits>
 #include <optional>
@@ -31,8 +33,10 @@ constexpr uint64_t MOST_DEALT = 1 << DEALT_DEPTH;
 // Elements that a thread takes from an array at a time; chosen.
 constexpr uint64_t SHARE = 32;
 
-// Lists of more triangles are halved in the middle: to try all places takes too long.
-constexpr size_t MOST_TRIED = 256;
+// References below a node of the kd-tree that become one list, if all are small: where
+// triangles are tiny, cells cut half of them, and each copy takes a place in a block.
+// Chosen from 64, 256, 512 and 2048 by frames of dragon: more gain little and take longer.
+constexpr size_t MOST_LISTED = 256;
 
 // An array that threads fill side by side.
 template <typename T>
@@ -77,22 +81,6 @@ struct WideArrays {
     explicit WideArrays(uint64_t references) : nodes(references + 1), blocks(references) {}
 };
 
-// A triangle of a leaf, and bounds of what of it lies there.
-struct Fragment {
-    Box3f box;
-    uint32_t number;
-
-    float twice_center(int axis) const { return box.lo[axis] + box.hi[axis]; }
-};
-
-// An order along an axis, without ties, so that the same tree is made each time.
-auto before_on(int axis) {
-    return [axis](const Fragment &a, const Fragment &b) {
-        const float at_a = a.twice_center(axis), at_b = b.twice_center(axis);
-        return at_a < at_b || (at_a == at_b && a.number < b.number);
-    };
-}
-
 // Makes parts of the wide tree, from the leaves up.
 class WideMaker {
 public:
@@ -101,15 +89,7 @@ public:
 
     // Throws Cancelled.
     WidePart part_of(uint32_t index, const Box3f &cell) {
-        const KdNode node = tree_.node(index);
-        if (node.is_leaf())
-            return part_of_leaf(node, cell);
-        interruption_.check();
-        const int axis = node.axis();
-        WidePart lower = part_of(node.lower_child(), lower_part(cell, axis, node.split()));
-        WidePart upper =
-            part_of(node.lower_child() + 1, upper_part(cell, axis, node.split()));
-        return joined(std::move(lower), std::move(upper), axis);
+        return part_of_subtree(index, cell, true);
     }
 
     // Of both sides of a plane across the axis, or of about that.
@@ -150,86 +130,80 @@ public:
     }
 
 private:
-    WidePart part_of_leaf(KdNode leaf, const Box3f &cell) {
+    // `may_be_listed` tells that it is not known to have few references that are not small.
+    WidePart part_of_subtree(uint32_t index, const Box3f &cell, bool may_be_listed) {
+        const KdNode node = tree_.node(index);
+        if (node.is_leaf()) {
+            const std::span<const uint32_t> references = tree_.references_of(node);
+            numbers_.assign(references.begin(), references.end());
+            list_triangles(cell);
+            return part_of_list(fragments_.all());
+        }
+        interruption_.check();
+        if (may_be_listed && find_few_references(index)) {
+            list_triangles(cell);
+            if (fragments_.are_small())
+                return part_of_list(fragments_.all());
+            may_be_listed = false;
+        }
+        const int axis = node.axis();
+        WidePart lower = part_of_subtree(
+            node.lower_child(), lower_part(cell, axis, node.split()), may_be_listed);
+        WidePart upper = part_of_subtree(
+            node.lower_child() + 1, upper_part(cell, axis, node.split()), may_be_listed);
+        return joined(std::move(lower), std::move(upper), axis);
+    }
+
+    // Numbers of the triangles below a node, without repeats. Returns false if there are
+    // too many references.
+    bool find_few_references(uint32_t index) {
+        numbers_.clear();
+        std::array<uint32_t, MAX_TREE_DEPTH + 1> waiting;
+        uint32_t pending = 0;
+        for (waiting[pending++] = index; pending > 0;) {
+            const KdNode node = tree_.node(waiting[--pending]);
+            if (!node.is_leaf()) {
+                waiting[pending++] = node.lower_child();
+                waiting[pending++] = node.lower_child() + 1;
+                continue;
+            }
+            const std::span<const uint32_t> references = tree_.references_of(node);
+            if (numbers_.size() + references.size() > MOST_LISTED)
+                return false;
+            numbers_.insert(numbers_.end(), references.begin(), references.end());
+        }
+        std::ranges::sort(numbers_);
+        numbers_.erase(std::ranges::unique(numbers_).begin(), numbers_.end());
+        return true;
+    }
+
+    void list_triangles(const Box3f &cell) {
         fragments_.clear();
-        for (const uint32_t number : tree_.references_of(leaf)) {
+        for (const uint32_t number : numbers_) {
             Box3f box = bounds_of(tree_.triangles[number]);
             for (int k = 0; k < 3; ++k) {
                 box.lo[k] = std::max(box.lo[k], cell.lo[k]);
                 box.hi[k] = std::min(box.hi[k], cell.hi[k]);
             }
-            fragments_.push_back({box, number});
+            fragments_.add({box, number});
         }
-        return part_of_list(fragments_);
     }
 
-    // Large leaves, which the rules of the kd-tree leave where triangles are tiny, are
-    // divided by surface area: a block costs the same however many triangles it holds.
-    WidePart part_of_list(std::span<Fragment> list) {
-        if (list.size() <= WideBlock::WIDTH) {
+    // Divides lists by surface area: a block costs the same however many triangles it
+    // holds.
+    WidePart part_of_list(const FragmentList::Range &range) {
+        if (range.count <= WideBlock::WIDTH) {
             WidePart part;
-            for (const Fragment &fragment : list)
+            for (uint32_t i = 0; i < range.count; ++i) {
+                const Fragment &fragment = fragments_.at(range, i);
                 part.add(fragment.number, fragment.box);
+            }
             return part;
         }
         interruption_.check();
-        const auto [axis, count] =
-            list.size() <= MOST_TRIED ? best_division(list) : middle(list);
-        WidePart first = part_of_list(list.first(count));
-        return joined(std::move(first), part_of_list(list.subspan(count)), axis);
-    }
-
-    struct Division {
-        int axis;
-        size_t count; // of fragments in the lower part, which come first
-    };
-
-    Division best_division(std::span<Fragment> list) {
-        const auto blocks = [](size_t count) {
-            return double((count + WideBlock::WIDTH - 1) / WideBlock::WIDTH);
-        };
-        Division best{};
-        double least = std::numeric_limits<double>::infinity();
-        area_above_.resize(list.size());
-        for (int axis = 0; axis < 3; ++axis) {
-            sort(list, axis);
-            Box3f box;
-            for (size_t i = list.size(); i-- > 1;) {
-                add_bounds(box, list[i].box);
-                area_above_[i] = surface_area(box);
-            }
-            box = {};
-            for (size_t i = 1; i < list.size(); ++i) {
-                add_bounds(box, list[i - 1].box);
-                const double cost = surface_area(box) * blocks(i) +
-                                    area_above_[i] * blocks(list.size() - i);
-                if (cost < least) {
-                    least = cost;
-                    best = {axis, i};
-                }
-            }
-        }
-        if (best.count == 0) // areas that are not finite
-            best = {2, list.size() / 2};
-        if (best.axis != 2)
-            sort(list, best.axis);
-        return best;
-    }
-
-    static Division middle(std::span<Fragment> list) {
-        Box3f box;
-        for (const Fragment &fragment : list)
-            add_bounds(box, fragment.box);
-        const Vec3f size = box.hi - box.lo;
-        const int axis =
-            size.x > size.y ? (size.x > size.z ? 0 : 2) : (size.y > size.z ? 1 : 2);
-        std::ranges::nth_element(list, list.begin() + ptrdiff_t(list.size() / 2),
-                                 before_on(axis));
-        return {axis, list.size() / 2};
-    }
-
-    static void sort(std::span<Fragment> list, int axis) {
-        std::ranges::sort(list, before_on(axis));
+        const auto [axis, below, above] = fragments_.divide(range, WideBlock::WIDTH);
+        WidePart lower = part_of_list(below);
+        return joined(std::move(lower), part_of_list(above), axis);
     }
 
     void make_children(WidePart &part) {
@@ -245,8 +219,8 @@ private:
     const Interruption &interruption_;
     SharedArray<WideNode>::Share nodes_;
     SharedArray<WideBlock>::Share blocks_;
-    std::vector<Fragment> fragments_;
-    std::vector<double> area_above_;
+    std::vector<uint32_t> numbers_; // of triangles
+    FragmentList fragments_;
 };
 
 // Deals out the subtrees at a depth of the kd-tree, and joins what is made of them.

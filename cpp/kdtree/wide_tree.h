@@ -5,7 +5,8 @@
 // about three levels of the kd-tree become one node, whose children are tested side by side
 // (as in Wald, Benthin and Boulos 2008, "Getting rid of packets"), and what lies in a part
 // with few triangles becomes one block. Boxes of children are disjoint as their cells are,
-// but where a large leaf was divided.
+// but where a large leaf was divided, or a subtree of triangles so small that its cells
+// would cut many of them.
 #pragma once
 
 #include "base/huge_array.h"

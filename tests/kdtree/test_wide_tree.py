@@ -160,6 +160,16 @@ def test_many_triangles_in_one_place_are_divided() -> None:
     assert max(depth for _, _, depth in tree.walk()) <= core.wide_selftest.max_wide_depth
 
 
+def test_few_copies_are_made_of_the_triangles_of_a_dense_surface() -> None:
+    """Cells of the kd-tree cut many of them."""
+    vertices, faces = workloads.sphere(5)
+    references = mlrt_plugin.KdTree(vertices, faces).report["references"]
+    tree = WideTree(vertices[faces])
+    numbers = np.concatenate([tree.numbers[block] for block, _, _ in tree.walk()])
+    copies = np.count_nonzero(numbers != NO_PRIMITIVE)
+    assert len(faces) <= copies < len(faces) + (references - len(faces)) / 2
+
+
 def bytes_after(rays: int, times: int, **options: object) -> int:
     rng = np.random.default_rng(SEED)
     tree = mlrt_plugin.KdTree(*workloads.sphere(4), **options)
