@@ -10,32 +10,16 @@
 
 namespace mlrt {
 
-namespace {
-
-// Two lights share the lanes of each packet. Beams of packets that are each of one pixel
-// are narrower; one light gains nothing by it, and with many most lanes would be empty.
-constexpr size_t LIGHTS_OF_WHOLE_PACKETS = 2; // chosen
-
-bool keeps_packets(const PreparedScene &scene, uint32_t samples_per_pixel) {
-    return samples_per_pixel % PACKET_WIDTH == 0 && !scene.data.objects &&
-           scene.data.emitters.size() == LIGHTS_OF_WHOLE_PACKETS;
-}
-
-} // namespace
-
-ShadowRays::ShadowRays(const PreparedScene &scene, uint32_t number, ShadowOffset offset,
-                       uint32_t samples_per_pixel)
+ShadowRays::ShadowRays(const PreparedScene &scene, uint32_t number, ShadowOffset offset)
     : light_position_(scene.data.emitters[number].position) {
     const Emitter &emitter = scene.data.emitters[number];
-    from_light_ = offset == ShadowOffset::mitsuba
-                      ? is_at_point(emitter.type)
-                      : scene.emitter_tables[number].shadow_rays_from_light;
-    whole_packets_ = from_light_ && keeps_packets(scene, samples_per_pixel);
     if (offset == ShadowOffset::mitsuba) {
+        from_light_ = is_at_point(emitter.type);
         begin_ = from_light_ ? SHADOW_EPSILON : 0.0f;
         end_ = from_light_ ? 1.0f : 1.0f - SHADOW_EPSILON;
         return;
     }
+    from_light_ = scene.emitter_tables[number].shadow_rays_from_light;
     begin_ = 0;
     end_ = BEFORE_TARGET;
     // All rays are parallel, wherever they start, and nothing is behind the light.
@@ -83,11 +67,7 @@ void ShadowRays::find_occluded(const SceneData &scene, const TraceOptions &optio
     const float *of_ray = cost_.data();
     for (const Packet &packet : std::span(packets_).first(packet_count_)) {
         const LaneArray<uint32_t> rays = to_lanes<uint32_t>(light.rays(packet.number));
-        for_each_lane(entries_of(packet.lanes), [&](uint32_t lane) {
-            if (packet.lanes >> lane & 1)
-                cost[rays[lane]] += *of_ray;
-            ++of_ray;
-        });
+        for_each_lane(packet.lanes, [&](uint32_t lane) { cost[rays[lane]] += *of_ray++; });
     }
 }
 
@@ -98,9 +78,8 @@ void ShadowRays::trace(const SceneData &scene, const TraceOptions &options,
     find_occluded(scene, options, counters, cost, light);
     const uint8_t *occluded = occluded_.data();
     for (const Packet &packet : std::span(packets_).first(packet_count_)) {
-        const LaneBits entries = entries_of(packet.lanes);
-        light.show(packet.number, packet.lanes & spread_to(entries, zero_bytes(occluded)));
-        occluded += std::popcount(entries);
+        light.show(packet.number, spread_to(packet.lanes, zero_bytes(occluded)));
+        occluded += std::popcount(packet.lanes);
     }
 }
 

@@ -11,7 +11,6 @@
 
 #include <bit>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -25,10 +24,7 @@ namespace mlrt {
 // are far away are traced from the surfaces.
 class ShadowRays {
 public:
-    // samples_per_pixel: camera rays come in packets, and the sixteen of one are those of
-    // one pixel if it is a multiple of that.
-    ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset,
-               uint32_t samples_per_pixel);
+    ShadowRays(const PreparedScene &scene, uint32_t emitter, ShadowOffset offset);
 
     bool from_light() const { return from_light_; }
 
@@ -42,14 +38,9 @@ public:
         reserve(count_ + PACKET_WIDTH);
         packets_[packet_count_++] = {packet, lanes};
         const uint32_t first = count_;
-        count_ += uint32_t(std::popcount(entries_of(lanes)));
+        count_ += uint32_t(std::popcount(lanes));
         for (int k = 0; k < 3; ++k) {
             float *direction = direction_[k].data() + first;
-            if (whole_packets_) {
-                store(direction, select(from_bits<FloatPacket>(lanes), from[k] - to[k],
-                                        FloatPacket(INACTIVE)));
-                continue;
-            }
             if (from_light_) {
                 store_compressed(direction, from[k] - to[k], lanes);
                 continue;
@@ -67,11 +58,6 @@ public:
                float *cost, ReflectedLight &light);
 
 private:
-    // A direction of no numbers, as of a ray that is not traced.
-    static constexpr float INACTIVE = std::numeric_limits<float>::quiet_NaN();
-
-    // Lanes that what is added takes entries for.
-    LaneBits entries_of(LaneBits lanes) const { return whole_packets_ ? ALL_LANES : lanes; }
     void reserve(size_t size) {
         if (occluded_.size() < size)
             grow(size);
@@ -81,7 +67,6 @@ private:
                        Counters &counters, float *cost, const ReflectedLight &light);
 
     bool from_light_;
-    bool whole_packets_; // entries for all lanes, so that packets stay those of one pixel
     Vec3f light_position_;
     std::optional<Vec3f> parallel_; // the direction of all rays, if they have the same
     float begin_, end_;             // of their intervals
@@ -91,7 +76,7 @@ private:
     AlignedVector<float> direction_[3];
     AlignedVector<float> cost_;
     AlignedVector<uint8_t> occluded_;
-    // What was added at once: neighbouring entries above.
+    // What was added at once: neighbouring entries above, one a lane.
     struct Packet {
         uint32_t number; // of reflected light
         LaneBits lanes;

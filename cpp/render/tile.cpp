@@ -28,7 +28,7 @@ TileRenderer::TileRenderer(const PreparedScene &scene, const SampleStreams &stre
       shares_(sampling.emitter_samples, sampling.bsdf_samples),
       bsdf_samples_(emitters_can_be_hit(scene) ? sampling.bsdf_samples : 0) {
     for (uint32_t emitter = 0; emitter < scene.data.emitters.size(); ++emitter) {
-        shadows_.emplace_back(scene, emitter, offset, streams.samples_per_pixel());
+        shadows_.emplace_back(scene, emitter, offset);
         // Mitsuba 3.9's direct.cpp does not divide light that comes from one direction by
         // the number of samples.
         const float shared_by =
