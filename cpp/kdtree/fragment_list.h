@@ -34,8 +34,8 @@ public:
     void add(const Fragment &fragment) { fragments_.push_back(fragment); }
     Range all() const { return {0, uint32_t(fragments_.size())}; }
 
-    // Whether each one is small beside the box around all of them, and none much larger than
-    // the others, as in dense scans.
+    // Whether each one is small beside the box around all of them, and none much larger
+    // than the others, as in dense scans.
     bool are_small() const;
 
     // Into two parts, neither of them empty: by the surface area heuristic, where blocks of
