@@ -148,8 +148,7 @@ class KdTree:
         """
         rays = ray_arrays(origins, directions, t_min, t_max)
         t, primitive, u, v = self._tree.closest_hit(*rays, trace_options(options))
-        # The core's mark of a miss, 2^32 - 1, is -1 as a signed number.
-        return Hits(t, primitive.view(np.int32), u, v)
+        return Hits(t, primitive, u, v)
 
     def any_hit(
         self,

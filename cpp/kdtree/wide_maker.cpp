@@ -130,8 +130,9 @@ public:
     }
 
 private:
-    // `may_be_listed` tells that it is not known to have few references that are not small.
-    WidePart part_of_subtree(uint32_t index, const Box3f &cell, bool may_be_listed) {
+    // `try_list`: whether its triangles may make one list, which those of a larger subtree
+    // did not for their sizes.
+    WidePart part_of_subtree(uint32_t index, const Box3f &cell, bool try_list) {
         const KdNode node = tree_.node(index);
         if (node.is_leaf()) {
             const std::span<const uint32_t> references = tree_.references_of(node);
@@ -140,17 +141,17 @@ private:
             return part_of_list(fragments_.all());
         }
         interruption_.check();
-        if (may_be_listed && find_few_references(index)) {
+        if (try_list && find_few_references(index)) {
             list_triangles(cell);
             if (fragments_.are_small())
                 return part_of_list(fragments_.all());
-            may_be_listed = false;
+            try_list = false;
         }
         const int axis = node.axis();
-        WidePart lower = part_of_subtree(
-            node.lower_child(), lower_part(cell, axis, node.split()), may_be_listed);
-        WidePart upper = part_of_subtree(
-            node.lower_child() + 1, upper_part(cell, axis, node.split()), may_be_listed);
+        WidePart lower = part_of_subtree(node.lower_child(),
+                                         lower_part(cell, axis, node.split()), try_list);
+        WidePart upper = part_of_subtree(node.lower_child() + 1,
+                                         upper_part(cell, axis, node.split()), try_list);
         return joined(std::move(lower), std::move(upper), axis);
     }
 

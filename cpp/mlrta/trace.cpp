@@ -57,10 +57,10 @@ private:
         beam.t_max = std::min(beam.t_max, t_end);
         BeamJudge judge(tree_, beam, options_, counters_);
         counters_.fallbacks += !judge.knows(parent.entries[0].cell);
-        if (Output::query == Query::any) {
+        if constexpr (Output::query == Query::any) {
             // Neighbouring tiles are often covered by the same triangle.
             const uint32_t last = blocker_of_thread(tree_);
-            if (last < tree_.triangles.size())
+            if (has_beams() && last < tree_.triangles.size())
                 judge.try_blocker(last);
             if (stopped_by_blocker(first, count, judge)) {
                 cost.add_to_run(first, count);
@@ -89,10 +89,17 @@ private:
         });
     }
 
+    // Traversals of the paper trace all rays of a tile that its search does not miss.
+    bool has_beams() const {
+        return options_.traversal == Traversal::adaptive ||
+               options_.traversal == Traversal::beam_leaf;
+    }
+
     // Whether a triangle stops all rays of the tile, of Query::any: it answers them then.
     bool stopped_by_blocker(uint32_t first, uint32_t count, const BeamJudge &judge) {
         if constexpr (Output::query == Query::any) {
-            if (!judge.found_blocker() || !(judge.t_max() <= first_end(first, count)))
+            if (!has_beams() || !judge.found_blocker() ||
+                !(judge.t_max() <= first_end(first, count)))
                 return false;
             blocker_of_thread(tree_) = judge.blocker();
             for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
@@ -113,7 +120,9 @@ private:
         return end;
     }
 
-    // Of up to sixteen rays from `first` on.
+    // Of up to sixteen rays from `first` on, of a beam that a triangle covers: its origin
+    // is finite, and no ray of it begins behind the triangle, so that no more is to be
+    // told.
     LaneBits active_rays(uint32_t first, uint32_t last) const {
         FloatPacket largest = 0.0f;
         auto active =

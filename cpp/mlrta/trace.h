@@ -56,7 +56,9 @@ struct TraceOptions {
     Culling culling = Culling::inverse_frustum;
     SearchOrder search_order = SearchOrder::shallow_first; // [E1, E2]
     uint32_t frontier = 0; // most subtrees that rays start at, up to 16; 0: usual [E3]
-    bool covering_triangles = true; // beams end at triangles that stop all rays [O1, O3]
+    // Beams end at triangles that stop all rays, and tiles of shadow rays are answered by
+    // them where rays go in beams [O1, O3].
+    bool covering_triangles = true;
 };
 
 // Nearest hits of all rays of the group. If the rays are those of a square of pixels,

@@ -14,6 +14,7 @@ import repository
 from bench_command import assert_one_sentence, command
 from bench_rays import expected_rays
 from mlrt_compare.bench.contenders import embree_device
+from mlrt_compare.bench.errors import BenchError
 from mlrt_compare.bench.kernels import closed_meshes, rays_inside
 from mlrt_compare.bench.native import INEXACT, WATERTIGHT, Native, load_native
 from mlrt_compare.bench.rays import RayBenchmark, Settings, Traced, difference
@@ -269,6 +270,8 @@ def test_embree_may_be_limited_to_the_instruction_set_of_mlrt(native: Native) ->
         for isa in ("avx2", "avx512")
     }
     assert not native_packets["avx2"]
+    with pytest.raises(BenchError, match="cannot be limited to 'native': choose avx2 or"):
+        embree_device(module, 1, "native")
     if module.isa == "avx512":
         assert native_packets["avx512"]
     settings = Settings((1,), 1, 16, (1,), (16,), {}, same_isa=True)

@@ -186,15 +186,18 @@ def test_camera_in_a_closed_room(core: ModuleType) -> None:
 
 
 @each_core
-@pytest.mark.parametrize("case", ["beyond", "all ends", "some before", "some inactive"])
+@pytest.mark.parametrize(
+    "case", ["beyond", "all ends", "some before", "some behind", "some inactive"]
+)
 def test_any_hits_of_tiles_that_one_triangle_covers(core: ModuleType, case: str) -> None:
     """A tile is answered as a whole only if the triangle lies in all rays' intervals."""
     rng = np.random.default_rng(SEED)
     # Two walls that cover the view: one after the other stops tiles of the same thread.
     grid = np.linspace(-0.25, 0.25, 64)
     directions = np.float32([(x, y, 1) for y in grid for x in grid])
-    rays = np.full_like(directions, 0.125), directions
+    origins = np.full_like(directions, 0.125)
     for depth in (2.0, 5.0):
+        rays = origins, directions.copy()
         wall = np.float32([(-9, -9, depth), (9, -9, depth + 1), (0, 27, depth - 1)])
         pieces, faces = workloads.soup(rng, 30, 0.2)
         vertices = np.concatenate([wall, pieces + np.float32((0, 0, depth + 4))])
@@ -209,6 +212,8 @@ def test_any_hits_of_tiles_that_one_triangle_covers(core: ModuleType, case: str)
             t_max = at_wall.copy()
         elif case == "some before":
             t_max[one] = np.nextafter(at_wall[one], np.float32(0))
+        elif case == "some behind":
+            t_min[one] = at_wall[one]
         elif case == "some inactive":
             t_max[one] = 0
             rays[1][one[0]] = np.nan
@@ -219,5 +224,10 @@ def test_any_hits_of_tiles_that_one_triangle_covers(core: ModuleType, case: str)
             ends = interval(rays, t_min, t_max)
             found = np.asarray(tree.any_hit(*rays, *ends, options, counters), bool)
             np.testing.assert_array_equal(found, expected, err_msg=str((SEED, options)))
-            if case == "beyond" and options.get("covering_triangles", True):
-                assert counters["blockers"] > 0 and counters["beams"] == 0
+            if case != "beyond" or not options.get("covering_triangles", True):
+                continue
+            assert counters["blockers"] > 0
+            if "traversal" not in options:  # adaptive
+                # Answered without being traced.
+                for what in ("beams", "packets", "traversal_steps", "triangle_tests"):
+                    assert counters[what] == 0, (what, options)

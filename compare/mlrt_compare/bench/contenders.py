@@ -7,11 +7,14 @@ from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
+from .errors import BenchError
 from .measure import Run
 
 MLRT, EMBREE = "MLRT", "Embree"
 LAZY = "lazy"
 BUILDERS, QUALITIES = ("exact", "fast", LAZY), ("MEDIUM", "HIGH")
+ISAS = ("avx2", "avx512")
+"""Instruction sets that both engines have, by their name in both."""
 WARM_UP_FACES = 2000
 """Of a scene, that each contender builds and renders before it is measured."""
 ENOUGH_SECONDS = 90.0
@@ -48,9 +51,14 @@ class Contender:
 def embree_device(module: ModuleType, threads: int, isa: str | None = None) -> Any:
     """A device whose threads are started beforehand, as those of MLRT's pool are.
 
-    isa: the widest instruction set that it may use, by Embree's name; all for None. There
-    should be one device at a time: see the native side.
+    isa: the widest instruction set that it may use, one of ISAS; all for None. Raises
+    BenchError for another one, of which Embree would not tell. There should be one device
+    at a time: see the native side.
     """
+    if isa is not None and isa not in ISAS:
+        raise BenchError(
+            f"Embree cannot be limited to '{isa}': choose {' or '.join(ISAS)} by MLRT_ISA"
+        )
     limit = "" if isa is None else f",isa={isa}"
     return module.EmbreeDevice(f"threads={threads},set_affinity=0,start_threads=1{limit}")
 

@@ -7,8 +7,9 @@ the two processes works at a time.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing.connection import Connection
@@ -93,10 +94,21 @@ def serve(
         pipe.send(None)
         while True:
             pipe.send(tracer.answer(pipe.recv()))
-    except (EOFError, KeyboardInterrupt):
+    except (EOFError, OSError):
         return
     except Exception as error:
         pipe.send(error)
+
+
+@contextmanager
+def no_interrupts() -> Iterator[None]:
+    """Processes that are started here leave Ctrl-C, which all processes of a terminal get,
+    to this one."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class Process:
@@ -111,7 +123,8 @@ class Process:
         self._process = context.Process(
             target=serve, args=(theirs, library, scene, settings), daemon=True
         )
-        self._process.start()
+        with no_interrupts():
+            self._process.start()
         # Else nobody here would notice that the other side has ended.
         theirs.close()
 
@@ -121,6 +134,7 @@ class Process:
 
     def __exit__(self, *_: object) -> None:
         self._pipe.close()
+        self._process.terminate()
         self._process.join()
 
     def timing(self, wanted: Frames) -> Timing:

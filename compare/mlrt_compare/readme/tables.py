@@ -61,7 +61,8 @@ def ray_lines(all_figures: Figures) -> list[str]:
     cells: dict[tuple[str, str], dict[str, dict[str, Any]]] = {}
     for figures in all_figures:
         for scene, block in blocks_of(figures):
-            column = f"{isa_of(figures)}, {plural(block['threads'])}"
+            both = " for both" if figures["settings"].get("same_isa") else ""
+            column = f"{isa_of(figures)}{both}, {plural(block['threads'])}"
             columns[column] = None
             row = cells.setdefault((scene, work(block["spp"], block["shadows"])), {})
             row[column] = block
@@ -76,13 +77,11 @@ def ray_lines(all_figures: Figures) -> list[str]:
             line += ["-", "-"] if found is None else [*ray_cells(found)]
         rows.append(line)
     blocks = [block for figures in all_figures for _, block in blocks_of(figures)]
-    limited = dict.fromkeys(
-        isa_of(figures) for figures in all_figures if figures["settings"].get("same_isa")
-    )
     limits = [
-        f"In columns of {isa} Embree is limited to it as well (`--same-isa`)."
-        for isa in limited
-    ]
+        "Where an instruction set is *for both*, Embree is limited to it (`--same-isa`)."
+        for figures in all_figures
+        if figures["settings"].get("same_isa")
+    ][:1]
     return [
         f"`mlrt-bench rays`: {pixels_of(all_figures)} pixels; the same rays by MLRT and by "
         "Embree 3 of the mitsuba wheel in whichever of its modes and build qualities is "
