@@ -11,6 +11,7 @@
 #include "geometry/triangle_test.h"
 #include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
+#include "traverse/single.h"
 
 #include <cmath>
 #include <memory>
@@ -145,16 +146,6 @@ ObjectsHandle make_objects(const Numbers &types, const Maps &frames,
     return {objects};
 }
 
-Vec3f origin_of(const RayGroup &rays, uint32_t i) {
-    if (rays.has_common_origin)
-        return rays.common_origin;
-    return by_axis([&](int k) { return rays.origin[k][i]; });
-}
-
-Vec3f direction_of(const RayGroup &rays, uint32_t i) {
-    return by_axis([&](int k) { return rays.direction[k][i]; });
-}
-
 // Weights of the second and third vertex; the place in its frame for a disk; else zeros.
 Vec2f surface_numbers(const KdTree &tree, const ObjectSet &objects, Vec3f origin,
                       Vec3f direction, float t, uint32_t face, uint32_t number) {
@@ -196,12 +187,13 @@ nb::tuple closest_hit(const ObjectsHandle &self, const TreeHandle &tree,
             trace_closest_objects(
                 objects, group,
                 {t.data() + first, face.data() + first, instance.data() + first}, counters);
-            for (uint32_t ray = 0; ray < group.count; ++ray) {
-                const size_t i = first + ray;
+            for (uint32_t number = 0; number < group.count; ++number) {
+                const size_t i = first + number;
                 if (face[i] != NO_PRIMITIVE) {
-                    const Vec2f uv = surface_numbers(
-                        *tree.tree, objects, origin_of(group, ray),
-                        direction_of(group, ray), t[i], face[i], instance[i]);
+                    const Ray ray = ray_of(group, number);
+                    const Vec2f uv =
+                        surface_numbers(*tree.tree, objects, ray.origin, ray.direction,
+                                        t[i], face[i], instance[i]);
                     u[i] = uv.x;
                     v[i] = uv.y;
                 }

@@ -18,8 +18,8 @@ constexpr uint32_t MOST_TRIED = 256;
 constexpr double SMALL_SHARE = 0.1;
 
 // The area of the largest one over the mean, in a scan. Without this limit single rays in
-// conference, whose triangles differ, take 2 to 4 % longer; with it dragon keeps nine
-// tenths of what lists gain.
+// conference, whose triangles differ, take 2 to 4 % longer; with it dragon keeps most
+// of what lists gain.
 constexpr double MOST_OF_MEAN = 4;
 
 } // namespace

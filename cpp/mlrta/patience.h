@@ -1,6 +1,8 @@
 // Whether beams pay where a thread traces, or rays had better go another way at once.
 #pragma once
 
+#include "mlrta/kept_by_thread.h"
+
 #include <algorithm>
 #include <cstdint>
 
@@ -40,14 +42,7 @@ private:
 // its patience, which costs some time at most.
 template <typename Kind>
 Patience &patience_of_thread(const void *scene) {
-    struct Known {
-        const void *scene = nullptr;
-        Patience patience;
-    };
-    thread_local Known known;
-    if (known.scene != scene)
-        known = {scene, {}};
-    return known.patience;
+    return kept_by_thread<Kind, Patience>(scene);
 }
 
 } // namespace mlrt

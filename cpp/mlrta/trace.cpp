@@ -2,6 +2,7 @@
 
 #include "mlrta/beam_tracer.h"
 #include "mlrta/frontier.h"
+#include "mlrta/kept_by_thread.h"
 #include "mlrta/packet_tracer.h"
 #include "mlrta/parallel_rays.h"
 #include "mlrta/ray_cost.h"
@@ -59,7 +60,7 @@ private:
         counters_.fallbacks += !judge.knows(parent.entries[0].cell);
         if constexpr (Output::query == Query::any) {
             // Neighbouring tiles are often covered by the same triangle.
-            const uint32_t last = blocker_of_thread(tree_);
+            const uint32_t last = last_blocker();
             if (has_beams() && last < tree_.triangles.size())
                 judge.try_blocker(last);
             if (stopped_by_blocker(first, count, judge)) {
@@ -101,7 +102,7 @@ private:
             if (!has_beams() || !judge.found_blocker() ||
                 !(judge.t_max() <= first_end(first, count)))
                 return false;
-            blocker_of_thread(tree_) = judge.blocker();
+            last_blocker() = judge.blocker();
             for (uint32_t i = first; i < first + count; i += PACKET_WIDTH)
                 output_.set(i, active_rays(i, first + count));
             return true;
@@ -120,32 +121,23 @@ private:
         return end;
     }
 
-    // Of up to sixteen rays from `first` on, of a beam that a triangle covers: its origin
-    // is finite, and no ray of it begins behind the triangle, so that no more is to be
-    // told.
+    // Of up to sixteen rays from `first` on, all of them before `last`.
     LaneBits active_rays(uint32_t first, uint32_t last) const {
-        FloatPacket largest = 0.0f;
-        auto active =
-            load_padded(rays_.t_min, first, last) < load_padded(rays_.t_max, first, last);
-        for (const float *direction : rays_.direction) {
-            const FloatPacket size = absolute(load_padded(direction, first, last));
-            active &= size < std::numeric_limits<float>::infinity();
-            largest = maximum(size, largest);
-        }
-        return to_bits(active & (largest > 0.0f));
+        const auto active = [](const auto &packet) {
+            return packet.rays.active | packet.extreme;
+        };
+        return first_lanes(last - first) &
+               (rays_.has_common_origin ? active(load_packet<CommonOrigin>(rays_, first))
+                                        : active(load_packet<LaneOrigins>(rays_, first)));
     }
 
-    // The last triangle that stopped all rays of a tile in the scene that this thread
-    // traced; another scene may have taken its place.
-    static uint32_t &blocker_of_thread(const KdTree &tree) {
-        struct Known {
-            const KdTree *scene = nullptr;
-            uint32_t blocker = NO_PRIMITIVE;
-        };
-        thread_local Known known;
-        if (known.scene != &tree)
-            known = {&tree, NO_PRIMITIVE};
-        return known.blocker;
+    // The last triangle that stopped all rays of a tile; of another scene if that had its
+    // place in memory before.
+    struct LastBlocker {
+        uint32_t primitive = NO_PRIMITIVE;
+    };
+    uint32_t &last_blocker() const {
+        return kept_by_thread<LastBlocker, LastBlocker>(&tree_).primitive;
     }
 
     const KdTree &tree_;

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from .measure import ROUNDS_A_REPEAT, Timing, in_turns
+from .measure import ROUNDS_A_REPEAT, Timing, in_turns, waiting_seconds
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,18 @@ class FrameRun:
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
+
+
+def timed_frames(render: Callable[[], Any], count: int) -> Timing:
+    """The mean of so many frames in a row; `render` returns seconds, wall and cpu."""
+    before = waiting_seconds()
+    frames = [render() for _ in range(count)]
+    waited = max(waiting_seconds() - before, 0.0)
+    return Timing(
+        sum(frame.wall for frame in frames) / count,
+        sum(frame.cpu for frame in frames) / count,
+        waited / count,
+    )
 
 
 def needs_run(runs: Sequence[FrameRun], repeats: int, enough: float) -> bool:

@@ -16,8 +16,8 @@ from mlrt_plugin.threads import thread_count
 from .ats import baselines
 from .build import BACKGROUND, LARGEST_DIFFERENCE
 from .contenders import QUALITIES, embree_device
-from .frame_runs import FrameRun, FrameSettings, measured_in_turns
-from .measure import Timing, best, waiting_seconds
+from .frame_runs import FrameRun, FrameSettings, measured_in_turns, timed_frames
+from .measure import Timing, best
 from .native import Native
 from .rays_contenders import (
     RayContender,
@@ -163,15 +163,8 @@ class RayBenchmark:
 
     def _render(self, variant: Variant, view: Any, shadows: bool, frames: int) -> Timing:
         """Seconds of one frame, the mean of some in a row."""
-        before = waiting_seconds()
-        seconds = [
-            variant.render(view, self._image, shadows=shadows) for _ in range(frames)
-        ]
-        waited = max(waiting_seconds() - before, 0.0)
-        return Timing(
-            sum(one.wall for one in seconds) / frames,
-            sum(one.cpu for one in seconds) / frames,
-            waited / frames,
+        return timed_frames(
+            lambda: variant.render(view, self._image, shadows=shadows), frames
         )
 
     def _tune(self, contenders: list[RayContender], view: Any, shadows: bool) -> None:

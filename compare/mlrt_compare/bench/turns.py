@@ -21,8 +21,8 @@ import numpy as np
 from mlrt_plugin.threads import thread_count
 
 from .errors import BenchError
-from .frame_runs import FrameRun, FrameSettings, measured_in_turns
-from .measure import Timing, waiting_seconds
+from .frame_runs import FrameRun, FrameSettings, measured_in_turns, timed_frames
+from .measure import Timing
 from .native import loaded
 from .rays import ENOUGH_SECONDS, GRIDS, RUN_SECONDS, Traced, difference
 from .scenes import BenchScene
@@ -75,14 +75,7 @@ class Tracer:
                 lit = np.zeros((side, side), np.uint8)
                 render(primitives=primitives, lit=lit)
                 return Traced(primitives, lit, self._image)
-            before = waiting_seconds()
-            frames = [render() for _ in range(wanted.count)]
-            waited = max(waiting_seconds() - before, 0.0)
-        return Timing(
-            sum(frame.wall for frame in frames) / wanted.count,
-            sum(frame.cpu for frame in frames) / wanted.count,
-            waited / wanted.count,
-        )
+            return timed_frames(render, wanted.count)
 
 
 def serve(
