@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 namespace mlrt {
 
@@ -212,6 +213,13 @@ bool BeamWalk<query>::walk(const Entry &entry) {
 }
 
 } // namespace
+
+BeamMemory &BeamMemory::of_thread(const KdTree &tree, Vec3f origin) {
+    thread_local const auto kept = std::make_unique<BeamMemory>();
+    kept->distances.start(tree, origin);
+    kept->occluder_count = kept->hit_count = 0;
+    return *kept;
+}
 
 template <Query query>
 bool trace_beam_leaf(const KdTree &tree, const RayGroup &rays, const Frontier &frontier,

@@ -20,12 +20,13 @@ namespace mlrt {
 
 // What the beams of a group leave to the next ones.
 struct BeamMemory {
-    BeamMemory(const KdTree &tree, Vec3f origin) : distances(tree, origin) {}
+    // That of this thread, for a new group of rays, which have the given origin if they
+    // have a common one. It is too much for the stacks of some threads.
+    static BeamMemory &of_thread(const KdTree &tree, Vec3f origin);
 
     HitDistances distances;
     Mailbox mailbox;
-    BeamPackets beam;            // the one that is traced
-    float triangles_per_ray = 0; // tested against beams; a moving average
+    BeamPackets beam; // the one that is traced
 
     // Triangles that stopped rays of the last beam, of Query::any: they are likely to stop
     // those of the next one too, and tested first.

@@ -29,7 +29,8 @@ public:
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
           packets_(tree, rays, options, output, counters), beam_(memory.beam),
-          regroupings_(regroupings), patience_(patience_of_thread<BeamTracer>(&tree)) {}
+          regroupings_(regroupings), patience_(patience_of_thread<BeamTracer>(&tree)),
+          triangles_per_ray_(kept_by_thread<BeamTracer, TrianglesPerRay>(&tree).mean) {}
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
@@ -41,9 +42,8 @@ public:
                 i += HUGE_BEAM;
                 continue;
             }
-            const bool large =
-                camera_ || (i % LARGE_BEAM == 0 &&
-                            memory_.triangles_per_ray <= LARGE_TRIANGLES_PER_RAY);
+            const bool large = camera_ || (i % LARGE_BEAM == 0 &&
+                                           triangles_per_ray_ <= LARGE_TRIANGLES_PER_RAY);
             const uint32_t rays = std::min(left, large ? LARGE_BEAM : SMALL_BEAM);
             if (packets_.knows_wide_tree() && patience_.spares_next()) {
                 ++counters_.fallbacks;
@@ -57,6 +57,10 @@ public:
     }
 
 private:
+    struct TrianglesPerRay {
+        float mean = 0;
+    };
+
     static constexpr bool PARALLEL = std::is_same_v<Origin, LaneOrigins>;
 
     // A large beam shares the walk, and what is made of each triangle, by more rays: it
@@ -141,7 +145,7 @@ private:
             judge(done, spent);
         else if (done && spent > DENSE)
             tree_.widening->miss(active); // rays that had better go apart
-        memory_.triangles_per_ray += 0.5f * (spent - memory_.triangles_per_ray);
+        triangles_per_ray_ += 0.5f * (spent - triangles_per_ray_);
         if constexpr (Output::query == Query::closest && EXACT_DISTANCES)
             if (done && output_.wants_distances())
                 memory_.distances.prepare({memory_.hit.data(), memory_.hit_count});
@@ -171,7 +175,7 @@ private:
     // Whether bounds by the film are narrow, or few triangles are tested against them.
     bool film_bounds_pay() const {
         return camera_ && (camera_->tile.begin == camera_->tile.end ||
-                           memory_.triangles_per_ray <= LOOSE_TRIANGLES_PER_RAY);
+                           triangles_per_ray_ <= LOOSE_TRIANGLES_PER_RAY);
     }
 
     // Writes what a packet has found, or leaves the rest of it to others.
@@ -242,8 +246,7 @@ private:
     }
 
     float share_of_parts() const {
-        return memory_.triangles_per_ray > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE
-                                                                    : USUAL_SHARE;
+        return triangles_per_ray_ > COSTLY_TRIANGLES_PER_RAY ? COSTLY_SHARE : USUAL_SHARE;
     }
 
     // Traces the parts of a beam whose rays leave a gap as beams of their own, or all in a
@@ -355,6 +358,8 @@ private:
     BeamPackets &beam_;    // kept by the memory, since regrouped rays need it no more
     uint32_t regroupings_; // that these rays come from
     Patience &patience_;
+    // Tested against beams that this thread traced last: a moving average.
+    float &triangles_per_ray_;
 };
 
 } // namespace mlrt

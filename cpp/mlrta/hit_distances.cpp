@@ -57,7 +57,7 @@ Vec3<FloatPacket> directions_of(const RayGroup &rays, uint32_t first_ray) {
 // by the size of normal.d. Tiny errors must not be rounded to zero.
 void HitDistances::put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitives) {
     using Real = DoubleBlock;
-    const TriangleBlock<FloatBlock> block(tree_.triangles.data(), primitives.data());
+    const TriangleBlock<FloatBlock> block(tree_->triangles.data(), primitives.data());
     const Vec3<Real> a = to_double(block.a);
     const PlaneOf<Real> plane(a, to_double(block.b), to_double(block.c));
     const Vec3d o(origin_);
@@ -229,7 +229,7 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
 
 // In double precision, and exactly where that does not suffice.
 float HitDistances::of_one(Vec3f direction, uint32_t primitive, Counters &counters) const {
-    const Triangle &triangle = tree_.triangles[primitive];
+    const Triangle &triangle = tree_->triangles[primitive];
     const TrianglePlane plane(triangle);
     const PlaneNumerator<double> numerator(plane, Vec3d(triangle.a) - Vec3d(origin_));
     const Vec3d d(direction);

@@ -19,7 +19,10 @@ namespace mlrt {
 // many, and which rays must be converted to. They round nearly all distances for certain.
 class HitDistances {
 public:
-    HitDistances(const KdTree &tree, Vec3f origin) : tree_(tree), origin_(origin) {
+    // For rays with this origin, before they are asked for.
+    void start(const KdTree &tree, Vec3f origin) {
+        tree_ = &tree;
+        origin_ = origin;
         known_.fill(NO_PRIMITIVE);
     }
 
@@ -70,7 +73,7 @@ private:
 
     bool knows(uint32_t primitive) const { return known_[primitive % SIZE] == primitive; }
 
-    const KdTree &tree_;
+    const KdTree *tree_ = nullptr;
     Vec3f origin_;
     std::array<uint32_t, SIZE> known_; // whose planes there are
     std::array<Plane, SIZE> planes_;

@@ -186,17 +186,17 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &a
     if (!rays.has_common_origin) {
         if constexpr (Output::query == Query::any)
             if (beams && are_parallel(rays)) {
-                BeamMemory memory(tree, {});
-                trace_runs(BeamTracer<LaneOrigins, Output>(tree, rays, options, nullptr,
-                                                           output, counters, memory));
+                trace_runs(BeamTracer<LaneOrigins, Output>(
+                    tree, rays, options, nullptr, output, counters,
+                    BeamMemory::of_thread(tree, {})));
                 return;
             }
         trace_runs(
             PacketTracer<LaneOrigins, Output>(tree, rays, options, output, counters));
     } else if (beams) {
-        BeamMemory memory(tree, rays.common_origin);
         trace_runs(BeamTracer<CommonOrigin, Output>(
-            tree, rays, options, camera ? &*camera : nullptr, output, counters, memory));
+            tree, rays, options, camera ? &*camera : nullptr, output, counters,
+            BeamMemory::of_thread(tree, rays.common_origin)));
     } else {
         trace_runs(
             PacketTracer<CommonOrigin, Output>(tree, rays, options, output, counters));
