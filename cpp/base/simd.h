@@ -52,6 +52,9 @@ using PointIndices = drjit::Packet<int32_t, 4>;
 using BoxPacket = drjit::Packet<float, 8>;
 using BoxLanes = drjit::Packet<int32_t, 8>;
 
+template <typename Packet>
+inline constexpr uint32_t LANES_OF = uint32_t(drjit::size_v<Packet>);
+
 // What comparing two T gives: bool, or one truth value a lane.
 template <typename T>
 using MaskOf = drjit::mask_t<T>;
@@ -172,10 +175,12 @@ T copy_sign(const T &a, const T &b) {
 }
 
 // Least and greatest lane. Lanes must be ordered (no NaN).
-inline float least_lane(const FloatPacket &a) {
+template <typename T>
+float least_lane(const T &a) {
     return drjit::min(a);
 }
-inline float greatest_lane(const FloatPacket &a) {
+template <typename T>
+float greatest_lane(const T &a) {
     return drjit::max(a);
 }
 
@@ -188,10 +193,11 @@ inline uint32_t union_of_lanes(const UIntPacket &a) {
 #if defined(__AVX512F__)
     return uint32_t(_mm512_reduce_or_epi32(a.m));
 #else
-    uint32_t bits = 0;
-    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
-        bits |= a.entry(lane);
-    return bits;
+    // In halves: what has no instruction of its own is done lane by lane.
+    const auto eight = drjit::low(a) | drjit::high(a);
+    const auto four = drjit::low(eight) | drjit::high(eight);
+    const auto two = drjit::low(four) | drjit::high(four);
+    return two.entry(0) | two.entry(1);
 #endif
 }
 
@@ -215,9 +221,20 @@ LaneBits to_bits(const Mask &mask) {
     }
 }
 
+// A value a lane in memory, for what is computed or looked up lane by lane.
+template <typename Value>
+struct alignas(64) LaneArray : std::array<Value, PACKET_WIDTH> {};
+
+constexpr LaneArray<uint32_t> bit_of_each_lane() {
+    LaneArray<uint32_t> bits{};
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; ++lane)
+        bits[lane] = 1u << lane;
+    return bits;
+}
+
 // The lanes whose bit is set, as a mask over T.
 template <typename T>
-MaskOf<T> from_bits(LaneBits bits) {
+[[gnu::always_inline]] inline MaskOf<T> from_bits(LaneBits bits) {
 #if defined(__AVX512F__)
     if constexpr (std::is_same_v<T, FloatPacket> || std::is_same_v<T, UIntPacket>)
         return MaskOf<T>::from_k(uint16_t(bits));
@@ -226,8 +243,9 @@ MaskOf<T> from_bits(LaneBits bits) {
         return MaskOf<T>(Half::from_k(uint8_t(bits)), Half::from_k(uint8_t(bits >> 8)));
     }
 #endif
-    const UIntPacket lane_bit = UIntPacket(1u) << drjit::arange<UIntPacket>();
-    return MaskOf<T>((UIntPacket(bits) & lane_bit) != 0u);
+    static constexpr LaneArray<uint32_t> LANE_BIT = bit_of_each_lane();
+    const auto lane_bit = drjit::load_aligned<UIntPacket>(LANE_BIT.data());
+    return MaskOf<T>((UIntPacket(bits) & lane_bit) == lane_bit);
 }
 
 inline float first_lane(const FloatPacket &packet) {
@@ -243,8 +261,9 @@ inline uint32_t lane_of(const UIntPacket &packet, uint32_t lane) {
 }
 
 // 0, 1, 2 ...
-inline FloatPacket lane_numbers() {
-    return drjit::arange<FloatPacket>();
+template <typename Packet = FloatPacket>
+Packet lane_numbers() {
+    return drjit::arange<Packet>();
 }
 inline UIntPacket lane_indices() {
     return drjit::arange<UIntPacket>();
@@ -281,16 +300,17 @@ void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
 }
 
-// The first values, fewer than a packet, and zeros; nothing behind them is read.
-inline FloatPacket load_first(const float *values, uint32_t count) {
+// The first values, fewer than there are lanes, and zeros; nothing behind them is read.
+template <typename Packet = FloatPacket>
+Packet load_first(const float *values, uint32_t count) {
 #if defined(__AVX512F__)
-    return FloatPacket(_mm512_maskz_loadu_ps(__mmask16(first_lanes(count)), values));
-#else
-    std::array<float, PACKET_WIDTH> padded{};
+    if constexpr (std::is_same_v<Packet, FloatPacket>)
+        return Packet(_mm512_maskz_loadu_ps(__mmask16(first_lanes(count)), values));
+#endif
+    std::array<float, LANES_OF<Packet>> padded{};
     for (uint32_t lane = 0; lane < count; ++lane)
         padded[lane] = values[lane];
-    return drjit::load<FloatPacket>(padded.data());
-#endif
+    return drjit::load<Packet>(padded.data());
 }
 
 // values[indices[lane]] in each lane; indices below 2^31.
@@ -310,10 +330,6 @@ Packet load_halves(const Value *low, const Value *high) {
     using Half = std::decay_t<decltype(drjit::low(Packet()))>;
     return Packet(drjit::load<Half>(low), drjit::load<Half>(high));
 }
-
-// A value a lane in memory, for what is computed or looked up lane by lane.
-template <typename Value>
-struct alignas(64) LaneArray : std::array<Value, PACKET_WIDTH> {};
 
 template <typename Packet, typename Value>
 Packet load(const LaneArray<Value> &lanes) {

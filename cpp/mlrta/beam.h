@@ -19,6 +19,12 @@ namespace mlrt {
 
 enum class Heading : int8_t { negative = -1, mixed = 0, positive = 1 };
 
+inline Heading heading_of(const Range &direction) {
+    return direction.lo > 0   ? Heading::positive
+           : direction.hi < 0 ? Heading::negative
+                              : Heading::mixed;
+}
+
 struct Beam {
     std::array<Range, 3> origin; // one point if the rays have a common origin
 

@@ -10,13 +10,14 @@ namespace mlrt {
 
 // Lane by lane: the second operand of minimum() and maximum() stays where the first is not
 // a number, so that what is to be left out is made one.
+template <typename Real = FloatPacket>
 struct PacketRange {
     static constexpr float NONE = std::numeric_limits<float>::quiet_NaN();
 
-    FloatPacket lo = std::numeric_limits<float>::infinity();
-    FloatPacket hi = -std::numeric_limits<float>::infinity();
+    Real lo = std::numeric_limits<float>::infinity();
+    Real hi = -std::numeric_limits<float>::infinity();
 
-    void add(const FloatPacket &x) {
+    void add(const Real &x) {
         lo = minimum(x, lo);
         hi = maximum(x, hi);
     }

@@ -8,6 +8,9 @@
 
 namespace mlrt {
 
+// Covers the few roundings of a quotient or product of doubles, many times over.
+inline constexpr double WIDEN_RANGE = 0x1p-45;
+
 struct Range {
     double lo = std::numeric_limits<double>::infinity();
     double hi = -std::numeric_limits<double>::infinity();
@@ -35,6 +38,8 @@ struct Range {
         return {a.lo + b.lo, a.hi + b.hi};
     }
 
+    // Of one sign.
+    Range reciprocal() const { return {1 / hi, 1 / lo}; }
     double magnitude() const { return std::max(std::abs(lo), std::abs(hi)); }
 };
 

@@ -19,7 +19,7 @@ public:
     void add(LaneBits lanes, const Vec3<FloatPacket> &p) {
         const auto mask = from_bits<FloatPacket>(lanes);
         for (int k = 0; k < 3; ++k)
-            ranges_[k].add(select(mask, p[k], FloatPacket(PacketRange::NONE)));
+            ranges_[k].add(select(mask, p[k], FloatPacket(PacketRange<>::NONE)));
     }
 
     Box3f box() const {
@@ -28,7 +28,7 @@ public:
     }
 
 private:
-    Vec3<PacketRange> ranges_;
+    Vec3<PacketRange<>> ranges_;
 };
 
 float reach_of(const Box3f &box) {

@@ -18,22 +18,26 @@ struct LoadedPacket {
     LaneBits extreme = 0;
 };
 
-// Sixteen values from `first` on; what lies past `count` reads as zero.
-inline FloatPacket load_padded(const float *values, uint32_t first, uint32_t count) {
-    if (first + PACKET_WIDTH <= count)
-        return load<FloatPacket>(values + first);
-    return load_first(values + first, count - first);
+// As many values as there are lanes from `first` on; what lies past `count` reads as zero.
+template <typename Packet = FloatPacket>
+[[gnu::always_inline]] inline Packet load_padded(const float *values, uint32_t first,
+                                                 uint32_t count) {
+    if (first + LANES_OF<Packet> <= count)
+        return load<Packet>(values + first);
+    return load_first<Packet>(values + first, count - first);
 }
 
 // The same; what lies past `count` is inactive, since both ends of its interval are zero.
-inline FloatPacket load_padded(const IntervalEnds &ends, uint32_t first, uint32_t count) {
+template <typename Packet = FloatPacket>
+[[gnu::always_inline]] inline Packet load_padded(const IntervalEnds &ends, uint32_t first,
+                                                 uint32_t count) {
     if (ends.each())
-        return load_padded(ends.each(), first, count);
-    const FloatPacket common(ends.common());
-    if (first + PACKET_WIDTH <= count)
+        return load_padded<Packet>(ends.each(), first, count);
+    const Packet common(ends.common());
+    if (first + LANES_OF<Packet> <= count)
         return common;
-    return select(from_bits<FloatPacket>(first_lanes(count - first)), common,
-                  FloatPacket(0.0f));
+    return select(lane_numbers<Packet>() < Packet(float(count - first)), common,
+                  Packet(0.0f));
 }
 
 template <typename Origin>
