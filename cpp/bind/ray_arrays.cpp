@@ -99,12 +99,13 @@ RayArrays::RayArrays(const Points &origins, const Points &directions, const Valu
 }
 
 bool RayArrays::seem_to_have_common_origin() const {
-    constexpr size_t SAMPLES = 256;
-    for (size_t n = 0; n < SAMPLES; ++n) {
-        const float *const row = origins_ + 3 * (n * count_ / SAMPLES);
-        if (count_ > 0 && !std::equal(row, row + 3, origins_))
+    constexpr size_t FEW = 4096, SAMPLES = 256;
+    if (count_ <= FEW)
+        return are_the_same(origins_, count_);
+    for (size_t n = 1; n <= SAMPLES; ++n)
+        if (!std::equal(origins_, origins_ + 3,
+                        origins_ + 3 * (n * (count_ - 1) / SAMPLES)))
             return false;
-    }
     return true;
 }
 
