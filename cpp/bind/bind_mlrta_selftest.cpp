@@ -317,9 +317,10 @@ void bind_mlrta_selftest(nb::module_ &m) {
             return children;
         },
         "(first, count) of the parts of a tile, in order.");
-    s.def("image_tiles", &image_tiles, nb::arg("directions"),
-          "The numbers of the rays of each tile, in order; None if they do not come line by "
-          "line.");
+    s.def(
+        "image_tiles", &image_tiles, nb::arg("directions"),
+        "The numbers of the rays of each tile, in order; None if they do not come line by "
+        "line.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
     s.def("frontier", &frontier_of, nb::arg("tree"), nb::arg("beam"), nb::arg("capacity"),
