@@ -5,12 +5,12 @@
 #include "bind/mesh_arrays.h"
 #include "bind/prepare_tree.h"
 #include "bind/ray_arrays.h"
+#include "bind/result_array.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
 #include "kdtree/lazy.h"
 #include "mlrta/trace_unordered.h"
-#include "render/pixel_array.h"
 #include "traverse/barycentrics.h"
 
 #include <memory>
@@ -46,12 +46,13 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*self.tree, rays, trace_options);
     const size_t count = rays.count();
-    PixelArray<float> t(count), u(count), v(count);
-    PixelArray<int32_t> primitive(count);
+    auto t = result_array<float>(count), u = result_array<float>(count);
+    auto v = result_array<float>(count);
+    auto primitive = result_array<int32_t>(count);
     const auto trace = [&](const RayRun &run, Counters &c) {
         // The mark of a miss, 2^32 - 1, is -1 as a signed number.
-        RayRun::Answers of_primitive(run, reinterpret_cast<uint32_t *>(primitive.data()));
-        RayRun::Answers of_t(run, t.data()), of_u(run, u.data()), of_v(run, v.data());
+        RayRun::Answers of_primitive(run, reinterpret_cast<uint32_t *>(primitive.get()));
+        RayRun::Answers of_t(run, t.get()), of_u(run, u.get()), of_v(run, v.get());
         trace_closest_unordered(*self.tree, run.group, trace_options,
                                 {of_t.data(), of_primitive.data()}, c, run.is_square());
         find_barycentrics(*self.tree, run.group, of_primitive.data(), of_u.data(),
@@ -64,9 +65,9 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     const Counters counters = rays.for_each_run(trace_options, trace);
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return nb::make_tuple(to_numpy(t.release(), {count}),
-                          to_numpy(primitive.release(), {count}),
-                          to_numpy(u.release(), {count}), to_numpy(v.release(), {count}));
+    return nb::make_tuple(to_numpy(std::move(t), {count}),
+                          to_numpy(std::move(primitive), {count}),
+                          to_numpy(std::move(u), {count}), to_numpy(std::move(v), {count}));
 }
 
 nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &directions,
@@ -75,9 +76,9 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*self.tree, rays, trace_options);
-    PixelArray<bool> occluded(rays.count());
+    auto occluded = result_array<bool>(rays.count());
     const auto trace = [&](const RayRun &run, Counters &c) {
-        RayRun::Answers answers(run, reinterpret_cast<uint8_t *>(occluded.data()));
+        RayRun::Answers answers(run, reinterpret_cast<uint8_t *>(occluded.get()));
         trace_any_unordered(*self.tree, run.group, trace_options, answers.data(), c,
                             run.is_square());
         answers.put_in_place();
@@ -85,7 +86,7 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const Counters counters = rays.for_each_run(trace_options, trace);
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return to_numpy(occluded.release(), {rays.count()});
+    return to_numpy(std::move(occluded), {rays.count()});
 }
 
 } // namespace

@@ -11,9 +11,9 @@ namespace mlrt {
 
 namespace {
 
-// Fewer rays make no tile that would be worth the search; and as many lines there should
-// be, so that no long part of the rays is searched for their ends. Chosen.
-constexpr size_t FEWEST_RAYS = 1024, FEWEST_LINES = 8;
+// Fewer rays gain less than the search takes; and as many lines there should be, so that no
+// long part of the rays is searched for their ends. Chosen.
+constexpr size_t FEWEST_RAYS = 4096, FEWEST_LINES = 8;
 
 // Rays at the beginning that are searched first, and then twice as many each time.
 constexpr size_t FIRST_WINDOW = 64;
@@ -106,13 +106,14 @@ std::optional<RayLines> RayLines::find(const float *directions, size_t count) {
 // width. Measures how square tiles are.
 bool RayLines::agree_with(const float *directions, float width) {
     MLRT_CHECK(line_count() > LINES_APART);
-    constexpr double GOLDEN = 0.6180339887498949; // spreads its multiples evenly
+    // The golden ratio in units of 2^-32: fractions of its multiples are spread evenly.
+    constexpr uint32_t GOLDEN = 0x9e3779b9;
     const size_t apart = LINES_APART * length_;
     const float near = NEAR * width;
     size_t good = 0;
     double sum = 0;
-    for (size_t n = 0; n < SAMPLES; ++n) {
-        const double share = (double(n) + std::fmod(double(n) * GOLDEN, 1.0)) / SAMPLES;
+    for (uint32_t n = 0; n < SAMPLES; ++n) {
+        const double share = (double(n) + 0x1p-32 * double(n * GOLDEN)) / SAMPLES;
         const auto ray = size_t(share * double(count_ - apart - LINES_APART));
         // Of rays behind it, since the first one of all may be the last one of its line.
         const size_t next = ray + apart;
