@@ -136,7 +136,8 @@ class KdTree:
         """The nearest hit of each ray {origin + t * direction, t_min < t <= t_max}.
 
         origins, directions: (N, 3); directions need not have unit length. Rays that follow
-        one another should be near one another in space.
+        one another should be near one another in space, or those of an image come line by
+        line.
         t_min, t_max: numbers or (N,). What lies behind the origin is never hit: a negative
         t_min counts as 0.
         options: fields of `TraceOptions`, see `mlrt_plugin.options.TRACE_OPTIONS`; they

@@ -6,6 +6,7 @@
 #include "bind/tree_handle.h"
 #include "geometry/triangle_test.h"
 #include "mlrta/frontier.h"
+#include "mlrta/ray_lines.h"
 #include "mlrta/tile.h"
 
 #include <map>
@@ -18,6 +19,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <tuple>
@@ -278,6 +280,21 @@ void bind_triangle_test(nb::module_ &s) {
     });
 }
 
+// The numbers of the rays of each tile, if lines are recognised.
+std::optional<std::vector<std::vector<uint32_t>>> image_tiles(const Points &directions) {
+    const auto lines = RayLines::find(directions.data(), directions.shape(0));
+    if (!lines)
+        return std::nullopt;
+    std::vector<uint32_t> all(directions.shape(0));
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<std::vector<uint32_t>> tiles;
+    for (uint32_t n = 0; n < lines->tile_count(); ++n) {
+        const ImageTile tile = lines->tile(n);
+        tile.copy_from(all.data(), tiles.emplace_back(tile.count()).data());
+    }
+    return tiles;
+}
+
 } // namespace
 
 void bind_mlrta_selftest(nb::module_ &m) {
@@ -300,6 +317,10 @@ void bind_mlrta_selftest(nb::module_ &m) {
             return children;
         },
         "(first, count) of the parts of a tile, in order.");
+    s.def(
+        "image_tiles", &image_tiles, nb::arg("directions"),
+        "The numbers of the rays of each tile, in order; None if they do not come line by "
+        "line.");
     s.def("entry_point", &entry_point, nb::arg("tree"), nb::arg("beam"),
           nb::arg("options") = nb::dict());
     s.def("frontier", &frontier_of, nb::arg("tree"), nb::arg("beam"), nb::arg("capacity"),

@@ -179,26 +179,30 @@ nb::tuple closest_hit(const ObjectsHandle &self, const TreeHandle &tree,
     prepare_tree(*tree.tree, rays, trace_options);
     std::vector<float> t(rays.count()), u(rays.count()), v(rays.count());
     std::vector<uint32_t> face(rays.count()), instance(rays.count());
-    rays.for_each_group(
-        unordered_group_size(trace_options, rays.count()),
-        [&](size_t first, const RayGroup &group, Counters &counters) {
-            trace_closest_unordered(*tree.tree, group, trace_options,
-                                    {t.data() + first, face.data() + first}, counters);
-            trace_closest_objects(
-                objects, group,
-                {t.data() + first, face.data() + first, instance.data() + first}, counters);
-            for (uint32_t number = 0; number < group.count; ++number) {
-                const size_t i = first + number;
-                if (face[i] != NO_PRIMITIVE) {
-                    const Ray ray = ray_of(group, number);
-                    const Vec2f uv =
-                        surface_numbers(*tree.tree, objects, ray.origin, ray.direction,
-                                        t[i], face[i], instance[i]);
-                    u[i] = uv.x;
-                    v[i] = uv.y;
-                }
+    rays.for_each_run(trace_options, [&](const RayRun &run, Counters &counters) {
+        RayRun::Answers of_t(run, t.data()), of_u(run, u.data()), of_v(run, v.data());
+        RayRun::Answers of_face(run, face.data()), of_instance(run, instance.data());
+        trace_closest_unordered(*tree.tree, run.group, trace_options,
+                                {of_t.data(), of_face.data()}, counters, run.is_square());
+        trace_closest_objects(objects, run.group,
+                              {of_t.data(), of_face.data(), of_instance.data()}, counters);
+        for (uint32_t i = 0; i < run.group.count; ++i) {
+            Vec2f uv;
+            if (of_face.data()[i] != NO_PRIMITIVE) {
+                const Ray ray = ray_of(run.group, i);
+                uv = surface_numbers(*tree.tree, objects, ray.origin, ray.direction,
+                                     of_t.data()[i], of_face.data()[i],
+                                     of_instance.data()[i]);
             }
-        });
+            of_u.data()[i] = uv.x;
+            of_v.data()[i] = uv.y;
+        }
+        of_t.put_in_place();
+        of_u.put_in_place();
+        of_v.put_in_place();
+        of_face.put_in_place();
+        of_instance.put_in_place();
+    });
     return nb::make_tuple(to_numpy<float>(std::move(t), {rays.count()}),
                           to_numpy<int32_t>(std::move(face), {rays.count()}),
                           to_numpy<int32_t>(std::move(instance), {rays.count()}),
@@ -213,13 +217,13 @@ nb::object any_hit(const ObjectsHandle &self, const TreeHandle &tree, const Poin
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*tree.tree, rays, trace_options);
     std::vector<uint8_t> occluded(rays.count());
-    rays.for_each_group(unordered_group_size(trace_options, rays.count()),
-                        [&](size_t first, const RayGroup &group, Counters &counters) {
-                            trace_any_unordered(*tree.tree, group, trace_options,
-                                                occluded.data() + first, counters);
-                            trace_any_objects(*self.objects, group, occluded.data() + first,
-                                              counters);
-                        });
+    rays.for_each_run(trace_options, [&](const RayRun &run, Counters &counters) {
+        RayRun::Answers answers(run, occluded.data());
+        trace_any_unordered(*tree.tree, run.group, trace_options, answers.data(), counters,
+                            run.is_square());
+        trace_any_objects(*self.objects, run.group, answers.data(), counters);
+        answers.put_in_place();
+    });
     return to_numpy<bool>(std::move(occluded), {rays.count()});
 }
 

@@ -5,6 +5,7 @@
 #include "bind/mesh_arrays.h"
 #include "bind/prepare_tree.h"
 #include "bind/ray_arrays.h"
+#include "bind/result_array.h"
 #include "bind/trace_options.h"
 #include "bind/tree_handle.h"
 #include "bind/watch.h"
@@ -17,7 +18,6 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 #include <optional>
-#include <vector>
 
 namespace nb = nanobind;
 
@@ -46,20 +46,23 @@ nb::tuple closest_hit(const TreeHandle &self, const Points &origins,
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*self.tree, rays, trace_options);
     const size_t count = rays.count();
-    auto t = std::make_unique_for_overwrite<float[]>(count);
-    auto primitive = std::make_unique_for_overwrite<int32_t[]>(count);
-    auto u = std::make_unique_for_overwrite<float[]>(count);
-    auto v = std::make_unique_for_overwrite<float[]>(count);
-    const Counters counters = rays.for_each_group(
-        unordered_group_size(trace_options, count),
-        [&](size_t first, const RayGroup &group, Counters &c) {
-            // The mark of a miss, 2^32 - 1, is -1 as a signed number.
-            const HitGroup hits{t.get() + first,
-                                reinterpret_cast<uint32_t *>(primitive.get() + first)};
-            trace_closest_unordered(*self.tree, group, trace_options, hits, c);
-            find_barycentrics(*self.tree, group, hits.primitive, u.get() + first,
-                              v.get() + first);
-        });
+    auto t = result_array<float>(count), u = result_array<float>(count);
+    auto v = result_array<float>(count);
+    auto primitive = result_array<int32_t>(count);
+    const auto trace = [&](const RayRun &run, Counters &c) {
+        // The mark of a miss, 2^32 - 1, is -1 as a signed number.
+        RayRun::Answers of_primitive(run, reinterpret_cast<uint32_t *>(primitive.get()));
+        RayRun::Answers of_t(run, t.get()), of_u(run, u.get()), of_v(run, v.get());
+        trace_closest_unordered(*self.tree, run.group, trace_options,
+                                {of_t.data(), of_primitive.data()}, c, run.is_square());
+        find_barycentrics(*self.tree, run.group, of_primitive.data(), of_u.data(),
+                          of_v.data());
+        of_primitive.put_in_place();
+        of_t.put_in_place();
+        of_u.put_in_place();
+        of_v.put_in_place();
+    };
+    const Counters counters = rays.for_each_run(trace_options, trace);
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
     return nb::make_tuple(to_numpy(std::move(t), {count}),
@@ -73,16 +76,17 @@ nb::object any_hit(const TreeHandle &self, const Points &origins, const Points &
     const TraceOptions trace_options = trace_options_from(options);
     const RayArrays rays(origins, directions, t_min, t_max);
     prepare_tree(*self.tree, rays, trace_options);
-    std::vector<uint8_t> occluded(rays.count());
-    const Counters counters =
-        rays.for_each_group(unordered_group_size(trace_options, rays.count()),
-                            [&](size_t first, const RayGroup &group, Counters &c) {
-                                trace_any_unordered(*self.tree, group, trace_options,
-                                                    occluded.data() + first, c);
-                            });
+    auto occluded = result_array<bool>(rays.count());
+    const auto trace = [&](const RayRun &run, Counters &c) {
+        RayRun::Answers answers(run, reinterpret_cast<uint8_t *>(occluded.get()));
+        trace_any_unordered(*self.tree, run.group, trace_options, answers.data(), c,
+                            run.is_square());
+        answers.put_in_place();
+    };
+    const Counters counters = rays.for_each_run(trace_options, trace);
     if (!counters_out.is_none())
         nb::cast<nb::dict>(counters_out).update(counters_to_dict(counters));
-    return to_numpy<bool>(std::move(occluded), {rays.count()});
+    return to_numpy(std::move(occluded), {rays.count()});
 }
 
 } // namespace

@@ -21,8 +21,8 @@ inline void prepare_tree(const KdTree &tree, const RayArrays &rays,
             tree.widening->make(tree, ask);
         else if (options.traversal == Traversal::adaptive && !tree.widening->tree() &&
                  !tree.growth)
-            tree.widening->make_for(tree, rays.have_common_origin() ? 0 : rays.count(),
-                                    ask);
+            tree.widening->make_for(
+                tree, rays.seem_to_have_common_origin() ? 0 : rays.count(), ask);
     }
     watch.rethrow();
 }

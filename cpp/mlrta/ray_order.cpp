@@ -45,6 +45,23 @@ struct Extent {
     float height() const { return greatest_lane(hi_y) - least_lane(lo_y); }
 };
 
+// The box around directions, lane by lane.
+struct Box {
+    Vec3<FloatPacket> lo = in_all_lanes({INFINITE, INFINITE, INFINITE});
+    Vec3<FloatPacket> hi = in_all_lanes({-INFINITE, -INFINITE, -INFINITE});
+
+    void add(const Vec3<FloatPacket> &least, const Vec3<FloatPacket> &greatest) {
+        for (int k = 0; k < 3; ++k) {
+            lo[k] = minimum(least[k], lo[k]);
+            hi[k] = maximum(greatest[k], hi[k]);
+        }
+    }
+    float longest_side() const {
+        return max_component(
+            by_axis([&](int k) { return greatest_lane(hi[k]) - least_lane(lo[k]); }));
+    }
+};
+
 } // namespace
 
 RayOrder::RayOrder(const RayGroup &rays) {
@@ -148,6 +165,29 @@ std::vector<uint32_t> RayOrder::cells_and_numbers(uint32_t dropped_bits) const {
         store(&keys[i], cell << NUMBER_BITS | (lane_indices() + i));
     }
     return keys;
+}
+
+bool are_in_order(const RayGroup &rays) {
+    constexpr float NARROWER = 2; // of four times, as squares in order are; chosen
+    constexpr uint32_t BEAM = RayNumbers::CAPACITY, SQUARE = 16 * BEAM;
+    float sides = 0, wider_sides = 0;
+    for (uint32_t first = 0; first < rays.count; first += SQUARE) {
+        Box square;
+        float beams = 0;
+        const uint32_t end = std::min(first + SQUARE, rays.count);
+        for (uint32_t i = first; i + BEAM <= end; i += BEAM, ++beams) {
+            Box beam;
+            for (uint32_t n = 0; n < BEAM; n += PACKET_WIDTH) {
+                const Vec3<FloatPacket> direction = by_axis(
+                    [&](int k) { return load<FloatPacket>(rays.direction[k] + i + n); });
+                beam.add(direction, direction);
+            }
+            square.add(beam.lo, beam.hi);
+            sides += beam.longest_side();
+        }
+        wider_sides += beams * square.longest_side();
+    }
+    return NARROWER * sides <= wider_sides;
 }
 
 } // namespace mlrt

@@ -41,4 +41,8 @@ private:
     std::vector<uint32_t> numbers_;
 };
 
+// Whether beams of consecutive rays are much narrower than those of sixteen times as many,
+// at a glance.
+bool are_in_order(const RayGroup &rays);
+
 } // namespace mlrt

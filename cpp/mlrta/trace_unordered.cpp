@@ -15,10 +15,13 @@ namespace mlrt {
 
 namespace {
 
+bool has_beams(const TraceOptions &options) {
+    return options.traversal == Traversal::beam_leaf ||
+           options.traversal == Traversal::adaptive;
+}
+
 bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
-    return !rays.cost && rays.count <= RayOrder::MOST_RAYS &&
-           (options.traversal == Traversal::beam_leaf ||
-            options.traversal == Traversal::adaptive);
+    return !rays.cost && rays.count <= RayOrder::MOST_RAYS && has_beams(options);
 }
 
 template <typename Value>
@@ -78,11 +81,15 @@ uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays) {
         std::max(usual, std::min<uint64_t>(rays / ENOUGH_GROUPS, RayOrder::MOST_RAYS)));
 }
 
+bool squares_pay(const TraceOptions &options, uint32_t rays) {
+    return has_beams(options) && options.initial_tile * options.initial_tile <= rays;
+}
+
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
-                             const TraceOptions &options, HitGroup hits,
-                             Counters &counters) {
+                             const TraceOptions &options, HitGroup hits, Counters &counters,
+                             bool square) {
     std::optional<RayOrder> order;
-    if (may_be_regrouped(rays, options))
+    if (may_be_regrouped(rays, options) && !(square && are_in_order(rays)))
         order.emplace(rays);
     if (!order || !order->pays()) {
         trace_closest(tree, rays, options, hits, counters);
@@ -100,9 +107,10 @@ void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,
 }
 
 void trace_any_unordered(const KdTree &tree, const RayGroup &rays,
-                         const TraceOptions &options, uint8_t *occluded,
-                         Counters &counters) {
-    if (!may_be_regrouped(rays, options) || are_parallel(rays)) {
+                         const TraceOptions &options, uint8_t *occluded, Counters &counters,
+                         bool square) {
+    if (!may_be_regrouped(rays, options) || are_parallel(rays) ||
+        (square && rays.has_common_origin && are_in_order(rays))) {
         trace_any(tree, rays, options, occluded, counters);
         return;
     }
