@@ -69,22 +69,28 @@ private:
 void find_barycentrics(const KdTree &tree, const RayGroup &rays, const uint32_t *primitive,
                        float *u, float *v) {
     const Barycentrics barycentrics(tree, rays);
-    for (uint32_t first = 0; first < rays.count; first += PACKET_WIDTH) {
-        const uint32_t count = std::min(rays.count - first, PACKET_WIDTH);
-        LaneArray<uint32_t> padded;
-        padded.fill(NO_PRIMITIVE);
-        std::copy_n(primitive + first, count, padded.begin());
-        const auto numbers = load<UIntPacket>(padded);
+    // Of sixteen rays from `first` on.
+    const auto find = [&](uint32_t first, const UIntPacket &numbers) {
         const LaneBits lanes = to_bits(numbers != NO_PRIMITIVE);
+        const auto hit = from_bits<FloatPacket>(lanes);
         const Vec2<FloatPacket> uv =
             lanes == 0 ? Vec2<FloatPacket>{} : barycentrics(first, numbers, lanes);
-        const auto hit = from_bits<FloatPacket>(lanes);
-        const auto write = [&](float *values, const FloatPacket &weight) {
-            const auto kept = to_lanes<float>(select(hit, weight, FloatPacket(0.0f)));
-            std::copy_n(kept.begin(), count, values + first);
-        };
-        write(u, uv.x);
-        write(v, uv.y);
+        return Vec2<FloatPacket>{select(hit, uv.x, FloatPacket(0.0f)),
+                                 select(hit, uv.y, FloatPacket(0.0f))};
+    };
+    uint32_t first = 0;
+    for (; first + PACKET_WIDTH <= rays.count; first += PACKET_WIDTH) {
+        const Vec2<FloatPacket> uv = find(first, load<UIntPacket>(primitive + first));
+        store(u + first, uv.x);
+        store(v + first, uv.y);
+    }
+    if (first < rays.count) {
+        LaneArray<uint32_t> padded;
+        padded.fill(NO_PRIMITIVE);
+        std::copy(primitive + first, primitive + rays.count, padded.begin());
+        const Vec2<FloatPacket> uv = find(first, load<UIntPacket>(padded));
+        std::copy_n(to_lanes<float>(uv.x).begin(), rays.count - first, u + first);
+        std::copy_n(to_lanes<float>(uv.y).begin(), rays.count - first, v + first);
     }
 }
 
