@@ -72,7 +72,8 @@ public:
             return;
         std::array<Hit, WideRays::MOST> hits;
         RayCost cost(rays_, counters_);
-        trace_wide(wide_, waiting_, Output::query, hits.data(), counters_);
+        trace_wide(wide_, tree_.triangles.data(), waiting_, Output::query, hits.data(),
+                   counters_);
         const float share = cost.share(waiting_.count);
         for (uint32_t i = 0; i < waiting_.count; ++i) {
             if (share > 0)
