@@ -56,7 +56,8 @@ public:
         FloatBlock near(ray_.search_from), far(ray_.search_end);
         for (size_t k = 0; k < 3; ++k) {
             const FloatBlock o(ray_.origin[k]);
-            // Where it is not a number it shortens nothing.
+            // Where it is not a number it shortens nothing. What underflow may take is
+            // added to one end of the interval, which does for both.
             near =
                 maximum((face(ray_.faces[k].first) - o) * FloatBlock(ray_.enter[k]), near);
             far = minimum(fused(face(ray_.faces[k].last) - o, FloatBlock(ray_.leave[k]),
@@ -141,7 +142,7 @@ private:
             pending_ = 1;
             return;
         }
-        // The depth is off by more than what these products are.
+        // WIDEN_FAR covers the roundings of a reciprocal and of three products.
         ray_.search_end = ray_.best_to * ray_.per_size * WIDEN_FAR + 2 * TINY_PARAMETER;
         uint32_t kept = 1;
         for (uint32_t i = 1; i < pending_; i += BLOCK_WIDTH) {
