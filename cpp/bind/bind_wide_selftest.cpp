@@ -4,7 +4,6 @@
 #include "bind/build_options.h"
 #include "bind/triangle_arrays.h"
 #include "geometry/block_volumes.h"
-#include "geometry/sheared_volumes.h"
 #include "kdtree/builder.h"
 #include "kdtree/wide_maker.h"
 #include "traverse/load_packet.h"
@@ -16,7 +15,6 @@
 #include <cstring>
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/array.h>
-#include <nanobind/stl/pair.h>
 #include <vector>
 
 namespace nb = nanobind;
@@ -68,9 +66,23 @@ BlockCoordinates coordinates_of(const TriangleArray &eight) {
     return coordinates;
 }
 
-// One bit a triangle: those that the ray certainly hits, and certainly misses.
-std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &direction,
-                                      const TriangleArray &eight) {
+// What volumes tell of the first ray, and the axis that depths are measured along.
+template <typename Seen>
+nb::tuple tuple_of(const Seen &seen, int axis) {
+    constexpr LaneBits OF_ONE_RAY = (1u << BLOCK_WIDTH) - 1;
+    std::array<float, PACKET_WIDTH> nearest{}, farthest{};
+    if (seen.possible != 0) {
+        store(nearest.data(), seen.nearest);
+        store(farthest.data(), seen.farthest);
+    }
+    return nb::make_tuple(seen.possible & OF_ONE_RAY, seen.certain & OF_ONE_RAY, nearest,
+                          farthest, axis);
+}
+
+// What volumes of one ray tell of it: bits of possible and certain hits, bounds of the
+// depths of the former, and the axis that these are measured along.
+nb::tuple seen_alone(const Point &origin, const Point &direction,
+                     const TriangleArray &eight) {
     const float zero = 0, one = 1;
     RayGroup group;
     group.count = 1;
@@ -85,15 +97,17 @@ std::pair<uint32_t, uint32_t> decided(const Point &origin, const Point &directio
         throw nb::value_error("a moderate direction");
     WideRays rays;
     rays.add(packet, 1, 0);
-    const ShearedRay sheared({origin[0], origin[1], origin[2]}, rays.main_axis[0],
-                             rays.shear_x[0], rays.shear_y[0]);
-    const ShearedVolumes<FloatBlock> volumes(sheared, coordinates_of(eight));
-    return {volumes.certain_hits(), volumes.certain_misses()};
+    const WideRay &ray = rays.beginning[0];
+    const auto &[x, y, z] = ray.ordered_origin;
+    const RayVolumes volumes(coordinates_of(eight), {ray.axes[0], ray.axes[1], ray.axes[2]},
+                             {x, y, z}, ray.side);
+    return tuple_of(volumes.seen_by(FloatBlock(ray.slopes[0]), FloatBlock(ray.slopes[1])),
+                    ray.axes[2]);
 }
 
-// What block volumes tell of the ray: bits of possible and certain hits, bounds of the
-// depths of the former, and the axis that these are measured along.
-nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray &eight) {
+// The same by volumes of two rays, both of them this one.
+nb::tuple seen_in_packet(const Point &origin, const Point &direction,
+                         const TriangleArray &eight) {
     const float zero = 0, one = 1;
     RayGroup group;
     group.count = 1;
@@ -110,16 +124,9 @@ nb::tuple seen(const Point &origin, const Point &direction, const TriangleArray 
     const PacketFrustum frustum(packet.rays, packet.main_axis, packet.side);
     const BlockVolumes volumes(coordinates_of(eight), frustum.axes, frustum.origin,
                                frustum.side);
-    const BlockVolumes::Seen seen = volumes.seen_by(FloatPacket(frustum.slopes[0][0]),
-                                                    FloatPacket(frustum.slopes[1][0]));
-    constexpr LaneBits ONE = (1u << BLOCK_WIDTH) - 1; // the first one of two equal rays
-    Eight nearest{}, farthest{};
-    if (seen.possible != 0) {
-        std::copy_n(to_lanes<float>(seen.nearest).begin(), BLOCK_WIDTH, nearest.begin());
-        std::copy_n(to_lanes<float>(seen.farthest).begin(), BLOCK_WIDTH, farthest.begin());
-    }
-    return nb::make_tuple(seen.possible & ONE, seen.certain & ONE, nearest, farthest,
-                          packet.main_axis);
+    return tuple_of(volumes.seen_by(FloatPacket(frustum.slopes[0][0]),
+                                    FloatPacket(frustum.slopes[1][0])),
+                    packet.main_axis);
 }
 
 // Rays from one point, and eight boxes (lower and upper corner, and one more that does not
@@ -176,8 +183,8 @@ void bind_wide_selftest(nb::module_ &m) {
           "they lie in memory.");
     s.def("is_made", &is_made, nb::arg("triangles"), nb::arg("cancelled"),
           nb::arg("options"));
-    s.def("decided", &decided);
-    s.def("seen", &seen);
+    s.def("seen_alone", &seen_alone);
+    s.def("seen_in_packet", &seen_in_packet);
     s.def("entered_boxes", &entered_boxes);
     s.attr("max_wide_depth") = MAX_WIDE_DEPTH;
 }

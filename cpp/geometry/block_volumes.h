@@ -1,4 +1,4 @@
-// Eight triangles as two rays with a common origin see them.
+// Eight triangles as one ray sees them, or two with a common origin.
 //
 // With the axis k that rays go along, x = d_i / |d_k| and y = d_j / |d_k|, and points
 // relative to the origin, z along d_k: a point is sheared to (p_i - x p_z, p_j - y p_z).
@@ -17,17 +17,20 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 namespace mlrt {
 
-class BlockVolumes {
-    using Real = FloatPacket;
+// Of one ray (a FloatBlock) or of two (a FloatPacket).
+template <typename Real>
+class VolumesOf {
+    static constexpr bool ONE_RAY = std::is_same_v<Real, FloatBlock>;
 
 public:
     // Coordinates are vertex by vertex, x, y and z of each, a value a triangle. The origin
     // has the order of the axes; `side` is the sign of d_k.
-    BlockVolumes(const std::array<std::array<float, BLOCK_WIDTH>, 9> &coordinates,
-                 const std::array<int, 3> &axes, const Vec3f &origin, float side)
+    VolumesOf(const std::array<std::array<float, BLOCK_WIDTH>, 9> &coordinates,
+              const std::array<int, 3> &axes, const Vec3f &origin, float side)
         : a_(relative(coordinates, 0, axes, origin, side)),
           b_(relative(coordinates, 3, axes, origin, side)),
           c_(relative(coordinates, 6, axes, origin, side)) {
@@ -37,13 +40,13 @@ public:
                              Real(UNDERFLOW));
     }
 
-    // What is certain of the rays: of the first one in lanes 0 to 7, of the second one
-    // above.
+    // What is certain of the rays: of the first one in lanes 0 to 7, of the second one, if
+    // there is one, above.
     struct Seen {
         LaneBits possible, certain; // hits, anywhere on the line
         // Bounds of the depth of a hit that is possible, if any is: of its sign, and of its
         // size if it is not negative.
-        FloatPacket nearest, farthest;
+        Real nearest, farthest;
     };
 
     // Slopes in the lanes of their rays, of at most 1 but for rounding.
@@ -77,7 +80,8 @@ public:
         const Real least = minimum(u, minimum(v, w)), greatest = maximum(u, maximum(v, w));
         Seen seen{};
         seen.possible = ALL_LANES & ~to_bits((least < -error) & (greatest > error));
-        if (seen.possible == 0)
+        // Which ray sees nothing is hard to foretell, so of one all is computed.
+        if (!ONE_RAY && seen.possible == 0)
             return seen;
         seen.certain = to_bits((least > error) | (greatest < -error));
         const Real reciprocal = 1.0f / (u + v + w);
@@ -104,8 +108,12 @@ private:
     relative(const std::array<std::array<float, BLOCK_WIDTH>, 9> &coordinates, size_t first,
              const std::array<int, 3> &axes, const Vec3f &origin, float side) {
         const auto coordinate = [&](size_t n) {
-            return load_twice(&coordinates[0][0] + BLOCK_WIDTH * uint32_t(axes[n]) +
-                              first * BLOCK_WIDTH);
+            const float *const values =
+                &coordinates[0][0] + BLOCK_WIDTH * uint32_t(axes[n]) + first * BLOCK_WIDTH;
+            if constexpr (ONE_RAY)
+                return load<Real>(values);
+            else
+                return load_twice(values);
         };
         return {coordinate(0) - origin.x, coordinate(1) - origin.y,
                 fused(coordinate(2), Real(side), Real(-side * origin.z))};
@@ -114,5 +122,8 @@ private:
     Vec3<Real> a_, b_, c_;
     Real depth_, linear_error_, least_error_;
 };
+
+using RayVolumes = VolumesOf<FloatBlock>;
+using BlockVolumes = VolumesOf<FloatPacket>;
 
 } // namespace mlrt

@@ -14,9 +14,10 @@ namespace mlrt {
 
 // What hit_distance() gives for each of the given lanes, one at least, which must hit their
 // triangle; other lanes get any value.
-inline FloatPacket hit_distances(const RayPacket<CommonOrigin> &rays, LaneBits lanes,
-                                 const UIntPacket &primitives, const Triangle *triangles,
-                                 Counters &counters) {
+template <typename Origin>
+FloatPacket hit_distances(const RayPacket<Origin> &rays, LaneBits lanes,
+                          const UIntPacket &primitives, const Triangle *triangles,
+                          Counters &counters) {
     const auto known = from_bits<UIntPacket>(lanes);
     const uint32_t any = lane_of(primitives, uint32_t(std::countr_zero(lanes)));
     const LaneArray<uint32_t> numbers =
@@ -34,7 +35,7 @@ inline FloatPacket hit_distances(const RayPacket<CommonOrigin> &rays, LaneBits l
     };
     const Vec3<DoublePacket> a = vertex(0);
     const PlaneOf<DoublePacket> plane(a, vertex(3), vertex(6));
-    const Vec3d o(rays.origin.point);
+    const auto o = to_double(rays.origin.point);
     const Vec3<DoublePacket> direction = to_double(rays.direction);
     const DoublePacket max_direction = largest_component(direction);
     const PlaneNumerator<DoublePacket> numerator(
@@ -44,7 +45,7 @@ inline FloatPacket hit_distances(const RayPacket<CommonOrigin> &rays, LaneBits l
     const LaneBits certain = to_bits(distance.template certain<FloatPacket>());
     for_each_lane(lanes & ~certain, [&](uint32_t lane) {
         ++counters.exact_distances;
-        t.entry(lane) = exact_distance(rays.origin.point, rays.lane_direction(lane),
+        t.entry(lane) = exact_distance(rays.origin.of_lane(lane), rays.lane_direction(lane),
                                        triangles[numbers[lane]]);
     });
     return t;

@@ -40,7 +40,7 @@ public:
         const uint32_t most = rays_.cost ? PACKET_WIDTH : WideRays::MOST;
         for (uint32_t i = first; i < first + count; i += PACKET_WIDTH) {
             add(i, first_lanes(first + count - i));
-            if (waiting_.count + PACKET_WIDTH > most)
+            if (waiting_ && waiting_->count + PACKET_WIDTH > most)
                 flush();
         }
         flush();
@@ -61,28 +61,32 @@ public:
             active &= ~add_packet(packet, active, first);
         if (active == 0)
             return;
-        if (!waiting_.has_room())
+        if (!waiting_)
+            waiting_ = std::make_unique_for_overwrite<WideRays>();
+        if (!waiting_->has_room())
             flush();
-        waiting_.add(packet, active, first);
+        waiting_->add(packet, active, first);
     }
 
     void flush() {
         flush_packets();
-        if (waiting_.count == 0)
+        if (!waiting_ || waiting_->count == 0)
             return;
         std::array<Hit, WideRays::MOST> hits;
         RayCost cost(rays_, counters_);
-        trace_wide(wide_, waiting_, Output::query, hits.data(), counters_);
-        const float share = cost.share(waiting_.count);
-        for (uint32_t i = 0; i < waiting_.count; ++i) {
+        WideRays &rays = *waiting_;
+        trace_wide(wide_, tree_.triangles.data(), rays, Output::query, hits.data(),
+                   counters_);
+        const float share = cost.share(rays.count);
+        for (uint32_t i = 0; i < rays.count; ++i) {
             if (share > 0)
-                rays_.cost[waiting_.number[i]] += share;
+                rays_.cost[rays.number[i]] += share;
             if (hits[i].primitive == NO_PRIMITIVE)
                 continue;
-            output_.set(waiting_.number[i], hits[i]);
+            output_.set(rays.number[i], hits[i]);
             occluder_.remember(hits[i].primitive);
         }
-        waiting_.count = 0;
+        rays.count = 0;
     }
 
 private:
@@ -96,7 +100,6 @@ private:
                         uint32_t first) {
         if (std::popcount(lanes) < LEAST_OF_PACKET)
             return 0;
-        // Few of the tracers that are made meet such rays.
         if (!packets_)
             packets_ = std::make_unique<std::array<WidePacket, MOST_PACKETS>>();
         WidePacket &packet = (*packets_)[packet_count_];
@@ -156,8 +159,9 @@ private:
     const RayGroup &rays_;
     Output output_;
     Counters &counters_;
-    WideRays waiting_;
     LastOccluder<Output> occluder_;
+    // Few of the tracers that are made meet rays of either kind.
+    std::unique_ptr<WideRays> waiting_;
     std::unique_ptr<std::array<WidePacket, MOST_PACKETS>> packets_;
     uint32_t packet_count_ = 0;
 };

@@ -5,59 +5,71 @@
 #include "geometry/ray_packet.h"
 
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <type_traits>
 
 namespace mlrt {
+
+// What a ray is to boxes and to triangles, and what it has found.
+//
+// Triangles are seen along the axis k of the largest component of the direction d, as in
+// block_volumes.h: a depth is t |d_k|.
+struct alignas(CACHE_LINE) WideRay {
+    // Not the distance of any hit.
+    static constexpr float UNKNOWN = -1;
+    // More than what underflow may take from a depth.
+    static constexpr float LEAST_DEPTH = 0x1p-120f;
+
+    // The faces of a box that a ray crosses first and last: as bytes into a WideNode.
+    struct Faces {
+        uint16_t first, last;
+    };
+
+    std::array<float, 3> origin;
+    // Reciprocals of the direction, less and more by what parameters of faces may be off.
+    std::array<float, 3> enter, leave;
+    float search_from, search_end; // no parameter outside is of interest
+    std::array<Faces, 3> faces;    // by axis
+    uint32_t octant;               // as in WideNode
+    uint32_t number;               // of the ray among WideRays
+
+    std::array<uint8_t, 4> axes; // the axis k is the third one, the fourth place is unused
+    std::array<float, 3> ordered_origin; // by these axes
+    std::array<float, 2> slopes;         // of the first two to |d_k|
+    float side, size, per_size;          // sign of d_k, |d_k| and its reciprocal
+    // The depth from which on hits count for certain, bounds of the depth of the best hit
+    // or, without one, of the end, and the distance of that hit.
+    float begin, best_from, best_to, best_distance;
+    uint32_t best; // triangle
+    uint32_t unused;
+};
+
+static_assert(sizeof(WideRay) == 2 * CACHE_LINE);
 
 struct WideRays {
     static constexpr uint32_t MOST = 256;
     template <typename Value>
     using Each = std::array<Value, MOST + PACKET_WIDTH>; // whole packets are written
 
-    Each<float> origin[3], direction[3], reciprocal[3], t_min, t_max;
-    // Of the axis of the largest component of the direction: see ShearedRay.
-    Each<uint32_t> main_axis;
-    Each<float> shear_x, shear_y;
-    Each<uint32_t> number; // of the ray in its group
+    Each<float> origin[3], direction[3], t_min, t_max;
+    Each<uint32_t> number;   // of the ray in its group
+    Each<WideRay> beginning; // of which nothing is found yet
     uint32_t count = 0;
 
     bool has_room() const { return count + PACKET_WIDTH <= MOST; }
 
     // Adds those lanes of a packet, which begins with ray number `first` of a group. There
     // must be room for a packet.
-    template <typename Origin>
-    void add(const RayPacket<Origin> &rays, LaneBits lanes, uint32_t first) {
-        const auto keep = [&](auto &values, const auto &packet) {
-            store_compressed(&values[count], packet, lanes);
-        };
-        const Vec3<FloatPacket> &d = rays.direction;
-        const FloatPacket size_x = absolute(d.x), size_y = absolute(d.y),
-                          size_z = absolute(d.z);
-        const auto is_x = (size_x > size_y) & (size_x > size_z);
-        const auto is_z = ~is_x & ~(size_y > size_z);
-        const auto pick = [](const auto &mask, const auto &yes, const auto &no) {
-            return select(MaskOf<FloatPacket>(mask), yes, no);
-        };
-        const FloatPacket along = pick(is_x, d.x, pick(is_z, d.z, d.y));
-        keep(shear_x, pick(is_x, d.y, d.x) / along);
-        keep(shear_y, pick(is_z, d.y, d.z) / along);
-        keep(main_axis,
-             select(MaskOf<UIntPacket>(is_x), UIntPacket(0u),
-                    select(MaskOf<UIntPacket>(is_z), UIntPacket(2u), UIntPacket(1u))));
-        for (int k = 0; k < 3; ++k) {
-            keep(direction[k], d[k]);
-            keep(reciprocal[k], rays.reciprocal[k]);
-            if constexpr (std::is_same_v<Origin, CommonOrigin>)
-                keep(origin[k], FloatPacket(rays.origin.point[k]));
-            else
-                keep(origin[k], rays.origin.point[k]);
-        }
-        keep(t_min, rays.t_min);
-        keep(t_max, rays.t_max);
-        keep(number, UIntPacket(first) + lane_indices());
-        count += uint32_t(std::popcount(lanes));
+    void add(const RayPacket<LaneOrigins> &rays, LaneBits lanes, uint32_t first);
+    void add(const RayPacket<CommonOrigin> &rays, LaneBits lanes, uint32_t first) {
+        add({{in_all_lanes(rays.origin.point)},
+             rays.direction,
+             rays.reciprocal,
+             rays.t_min,
+             rays.t_max,
+             rays.max_direction,
+             rays.active},
+            lanes, first);
     }
 };
 

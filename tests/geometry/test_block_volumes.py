@@ -1,5 +1,5 @@
-"""What single precision tells of a ray among those of one origin, and eight triangles,
-against fractions."""
+"""What single precision tells of a ray, alone or among those of one origin, and eight
+triangles, against fractions."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ def exact_hit(
 @each_core
 @pytest.mark.parametrize("scale", [1e-30, 1e-15, 1e-6, 1.0, 1e6, 1e11, 1e20])
 @pytest.mark.parametrize("distance", [1.0, 300.0])
-def test_what_is_told_is_true(core: ModuleType, scale: float, distance: float) -> None:
+@pytest.mark.parametrize("seen", ["seen_alone", "seen_in_packet"])
+def test_what_is_told_is_true(
+    core: ModuleType, seen: str, scale: float, distance: float
+) -> None:
     """Rays through points, edges and surroundings of small triangles that are far away,
     where rounding counts most, and of thin ones."""
     rng = np.random.default_rng(SEED)
@@ -72,7 +75,7 @@ def test_what_is_told_is_true(core: ModuleType, scale: float, distance: float) -
         if not direction.any():
             continue
         origin, triangles = np.float32(scale * origin), np.float32(scale * triangles)
-        possible, sure, nearest, farthest, axis = core.wide_selftest.seen(
+        possible, sure, nearest, farthest, axis = getattr(core.wide_selftest, seen)(
             tuple(map(float, origin)), tuple(map(float, direction)), triangles
         )
         for i, triangle in enumerate(triangles):
