@@ -24,8 +24,8 @@ namespace {
 constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
 // More than what underflow may take from a depth.
 constexpr float LEAST_DEPTH = 0x1p-120f;
-// Distances below it may be denormal, and then equal where depths differ.
-constexpr float SMALLEST_DISTANCE = 0x1p-125f;
+// Distances below it are looked at more closely, as in wide_rays.cpp.
+constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 
 // Not the distance of any hit.
 constexpr float UNKNOWN = -1;
