@@ -64,7 +64,8 @@ private:
         MaskOf<FloatPacket> possible = false, certain = false, nearer = false;
         FloatPacket lowest = 0.0f, highest = 0.0f; // bounds of its reciprocal depths
     };
-    Seen see(uint32_t packet, const TriangleForms &forms, uint32_t lane) const;
+    [[gnu::always_inline]] inline Seen see(uint32_t packet, const TriangleForms &forms,
+                                           uint32_t lane) const;
     bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive, LaneBits open);
     void decide(uint32_t packet, LaneBits lanes, const Seen &seen, uint32_t primitive);

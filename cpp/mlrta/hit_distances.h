@@ -63,7 +63,8 @@ private:
     FloatPacket of_several(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                            const UIntPacket &primitives, Counters &counters);
     template <typename Value>
-    static Rounded rounded(const Vec3<FloatPacket> &direction, const Planes<Value> &planes);
+    [[gnu::always_inline]] static inline Rounded rounded(const Vec3<FloatPacket> &direction,
+                                                         const Planes<Value> &planes);
     FloatPacket with_ones(FloatPacket distances, const RayGroup &rays, uint32_t first_ray,
                           LaneBits open, const UIntPacket &primitives,
                           Counters &counters) const;
