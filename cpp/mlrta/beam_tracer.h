@@ -36,11 +36,12 @@ public:
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
         for (uint32_t i = 0; i < count;) {
             const uint32_t left = count - i;
-            // Aligned, so that beams of all sizes are squares of a camera's rays.
-            if (camera_ && i % HUGE_BEAM == 0 && left >= HUGE_BEAM &&
-                trace_huge_beam(first + i, frontier)) {
-                i += HUGE_BEAM;
-                continue;
+            if (may_be_huge(i, left)) {
+                const uint32_t rays = std::min(left, HUGE_BEAM);
+                if (trace_huge_beam(first + i, rays, frontier)) {
+                    i += rays;
+                    continue;
+                }
             }
             const bool large = camera_ || (i % LARGE_BEAM == 0 &&
                                            triangles_per_ray_ <= LARGE_TRIANGLES_PER_RAY);
@@ -69,20 +70,30 @@ private:
     static constexpr uint32_t LARGE_BEAM = Occupancy::MOST_RAYS;
     static constexpr uint32_t SMALL_BEAM = RayNumbers::CAPACITY;
 
-    // A beam that is larger still, of a camera's rays. Returns false if it was not tried,
-    // or given up, and has left nothing then.
-    bool trace_huge_beam(uint32_t first, const Frontier &frontier) {
+    // Whether rays from number i on, of which so many are left, may be a beam that is
+    // larger still. Aligned, so that beams of all sizes are squares of a camera's rays.
+    bool may_be_huge(uint32_t i, uint32_t left) const {
+        if (i % HUGE_BEAM != 0)
+            return false;
+        return camera_ ? left >= HUGE_BEAM
+                       : Output::query == Query::any && left > LARGE_BEAM &&
+                             triangles_per_ray_ <= HUGE_TRIANGLES_PER_RAY;
+    }
+
+    // Returns false if it was not tried, or given up, and has left nothing then.
+    bool trace_huge_beam(uint32_t first, uint32_t count, const Frontier &frontier) {
         struct HugeBeams {};
         Patience &patience = patience_of_thread<HugeBeams>(&tree_);
         if ((packets_.knows_wide_tree() && patience_.spares()) || patience.spares_next())
             return false;
         const uint64_t before = counters_.beam_triangles;
-        if (!trace_beam(first, HUGE_BEAM, frontier, true)) {
+        if (!trace_beam(first, count, frontier, true)) {
             patience.lose();
             return false;
         }
+        // Camera rays that meet nothing tell nothing of the next ones.
         const uint64_t spent = counters_.beam_triangles - before;
-        if (spent > 0 && spent <= MOST_OF_HUGE_BEAM / 2)
+        if ((spent > 0 || Output::query == Query::any) && spent <= MOST_OF_HUGE_BEAM / 2)
             patience.win();
         return true;
     }
@@ -103,7 +114,11 @@ private:
                 trace_strays(frontier);
             return true;
         }
-        if (count > SMALL_BEAM && (beam.any_stray || (!camera_ && leaves_gaps()))) {
+        const bool huge = count > LARGE_BEAM;
+        if (huge && beam.any_stray)
+            return false;
+        if (count > SMALL_BEAM &&
+            (beam.any_stray || (!camera_ && !huge && leaves_gaps()))) {
             for (uint32_t i = 0; i < count; i += SMALL_BEAM)
                 trace_beam(first + i, std::min(count - i, SMALL_BEAM), frontier, ordered);
             return true;
@@ -125,17 +140,14 @@ private:
         ++counters_.beams;
         RayCost cost(rays_, counters_);
         const uint64_t before = counters_.beam_triangles;
-        const BeamBudget budget =
-            count > LARGE_BEAM ? BeamBudget(MOST_OF_HUGE_BEAM, FIRST_LOOK_AT_HUGE_BEAM,
-                                            LEAST_YIELD_OF_HUGE_BEAM)
-                               : budget_of(active);
+        const BeamBudget budget = huge ? budget_of_huge_beam() : budget_of(active);
         const bool done = trace_beam_leaf<Output::query>(tree_, rays_, frontier, memory_,
                                                          budget, beam, counters_);
         if (const float share = cost.share(active); share > 0)
             for (uint32_t n = 0; n < beam.count; ++n)
                 cost.add_to_lanes(beam.lanes[n].first_ray, beam.lanes[n].active, share);
         counters_.fallbacks += !done;
-        if (!done && count > LARGE_BEAM) {
+        if (!done && huge) {
             counters_.rays -= active;
             counters_.packets -= beam.count;
             return false;
@@ -317,8 +329,13 @@ private:
     // where triangles are small, the nearer ones of them leave more to be tested than
     // smaller beams would. Chosen from 40 to 500, from 30 to 80 and from 20 to 60 or none,
     // by what tracing takes in office, conference, sponza and building.
-    static constexpr uint32_t MOST_OF_HUGE_BEAM = 160, FIRST_LOOK_AT_HUGE_BEAM = 60;
+    static constexpr uint32_t FIRST_LOOK_AT_HUGE_BEAM = 60;
     static constexpr float LEAST_YIELD_OF_HUGE_BEAM = 30;
+    // Shadow rays are not looked at how they lie to each other in such a beam, so that it
+    // had better meet few triangles, as the beams before it did. Chosen from 0.005 to 0.02 by
+    // frames of office, conference and sponza.
+    static constexpr uint32_t MOST_OF_HUGE_BEAM = Output::query == Query::any ? 40 : 160;
+    static constexpr float HUGE_TRIANGLES_PER_RAY = 0.01f;
 
     // The same where there is the wide tree, which takes less time then. Beams that meet
     // more than DENSE triangles a ray had better not be tried, those that meet less than
@@ -334,6 +351,13 @@ private:
     static constexpr float FIRST_LOOK = 0.19f;
     static constexpr uint32_t FREE_OF_LOOKS = 32;
     static constexpr float LEAST_YIELD = 0.3f;
+
+    static BeamBudget budget_of_huge_beam() {
+        if constexpr (Output::query == Query::any)
+            return BeamBudget(MOST_OF_HUGE_BEAM);
+        return BeamBudget(MOST_OF_HUGE_BEAM, FIRST_LOOK_AT_HUGE_BEAM,
+                          LEAST_YIELD_OF_HUGE_BEAM);
+    }
 
     BeamBudget budget_of(uint32_t rays) const {
         if (options_.traversal != Traversal::adaptive)
