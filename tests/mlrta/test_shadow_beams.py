@@ -21,7 +21,7 @@ FloatArray = npt.NDArray[np.float32]
 
 
 def receivers(rng: np.random.Generator, tiles: int) -> FloatArray:
-    """Points on a floor, in squares side by side as a camera sees them, one after the other."""
+    """Points on a floor, in squares side by side, each as a camera sees it."""
     codes = np.arange(COUNT)
     column, row = (
         sum(((codes >> (2 * bit + axis)) & 1) << bit for bit in range(6)) for axis in (0, 1)
