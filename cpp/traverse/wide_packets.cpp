@@ -7,6 +7,7 @@
 #include "traverse/packet_frustum.h"
 #include "traverse/parameter_interval.h"
 #include "traverse/wide_entry.h"
+#include "traverse/wide_scene.h"
 
 #include <algorithm>
 #include <array>
@@ -30,30 +31,6 @@ constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 
 // Not the distance of any hit.
 constexpr float UNKNOWN = -1;
-
-// What all packets walk through.
-struct Scene {
-    const WideNode *nodes;
-    const WideBlock *blocks;
-    uint64_t from_nodes_to_blocks; // in bytes
-    WideChild root;
-    const Triangle *triangles;
-
-    Scene(const WideTree &tree, const Triangle *all)
-        : nodes(tree.nodes.data()), blocks(tree.blocks.data()),
-          from_nodes_to_blocks(reinterpret_cast<uint64_t>(blocks) -
-                               reinterpret_cast<uint64_t>(nodes)),
-          root(tree.root), triangles(all) {}
-
-    // In memory, without a branch.
-    const WideBlock *place(WideChild child) const {
-        static_assert(sizeof(WideBlock) == sizeof(WideNode) + CACHE_LINE);
-        const auto of_block = -uint64_t(child.is_block());
-        return reinterpret_cast<const WideBlock *>(
-            reinterpret_cast<uint64_t>(nodes) + (from_nodes_to_blocks & of_block) +
-            child.index() * sizeof(WideNode) + (child.index() & of_block) * CACHE_LINE);
-    }
-};
 
 template <Query QUERY>
 class PacketWalk;
@@ -79,7 +56,7 @@ public:
     using Candidates = CandidatesOf<QUERY>;
 
     // At an entry of its group or, without one, at the root.
-    void start(const Scene &scene, const WidePacket &packet, const WideNode *entry,
+    void start(const WideScene &scene, const WidePacket &packet, const WideNode *entry,
                uint32_t number) {
         number_ = number;
         rays_ = &packet.rays;
@@ -115,7 +92,7 @@ public:
     }
 
     // Takes a child that waits, one at least, and asks for its memory.
-    void take(const Scene &scene) {
+    void take(const WideScene &scene) {
         Level &level = levels_[depth_ - 1];
         const uint32_t place = uint32_t(std::bit_width(level.waiting)) - 1;
         level.waiting ^= 1u << place;
@@ -125,7 +102,7 @@ public:
         entered_ = level.lanes &
                    frustum_.entering(level.boxes, child, load<FloatPacket>(best_to_));
         next_ = WideChild::from_bits(level.children[child]);
-        prefetch(scene.place(next_));
+        scene.prefetch_child(next_);
     }
     bool is_at_end() const { return depth_ == 0; }
     // What was taken last: whether rays enter it, and whether it is a block.
@@ -133,7 +110,7 @@ public:
     bool is_at_block() const { return next_.is_block(); }
 
     // Lets those children wait that rays may enter.
-    void visit_node(const Scene &scene) { visit(scene.nodes[next_.index()]); }
+    void visit_node(const WideScene &scene) { visit(scene.nodes[next_.index()]); }
     void visit(const WideNode &node) {
         Level &level = levels_[depth_];
         const MaskOf<FloatBlock> entered = frustum_.entered_by(entered_, node, level.boxes);
@@ -147,7 +124,7 @@ public:
     }
 
     // Adds what its rays may hit of a block.
-    Candidates *visit_block(const Scene &scene, Candidates *found, Counters &counters) {
+    Candidates *visit_block(const WideScene &scene, Candidates *found, Counters &counters) {
         const WideBlock &block = scene.blocks[next_.index()];
         const BlockVolumes volumes(block.coordinates, frustum_.axes, frustum_.origin,
                                    frustum_.side);
@@ -167,10 +144,10 @@ public:
             };
             const BlockVolumes::Seen seen =
                 volumes.seen_by(of_both(frustum_.slopes[0]), of_both(frustum_.slopes[1]));
-            const LaneBits possible =
-                seen.possible & (there | (two ? there << BLOCK_WIDTH : 0)) &
-                ~to_bits((seen.nearest > of_both(best_to_)) |
-                         (seen.farthest < FloatPacket(0.0f)));
+            const LaneBits possible = seen.possible &
+                                      (there | (two ? there << BLOCK_WIDTH : 0)) &
+                                      ~to_bits((seen.nearest > of_both(best_to_)) |
+                                               (seen.farthest < FloatPacket(0.0f)));
             found->walk = this;
             found->rays = {first, second};
             found->possible = possible;
@@ -182,7 +159,7 @@ public:
         return found;
     }
 
-    void test(const Scene &scene, const Candidates &candidates, Counters &counters) {
+    void test(const WideScene &scene, const Candidates &candidates, Counters &counters) {
         const WideBlock &block = scene.blocks[next_.index()];
         for_each_lane(candidates.possible, [&](uint32_t lane) {
             const uint32_t ray = candidates.rays[lane / BLOCK_WIDTH];
@@ -289,15 +266,15 @@ private:
 template <Query QUERY>
 void trace(const WideTree &tree, const Triangle *triangles,
            std::span<const WidePacket> packets, WideHits *hits, Counters &counters) {
-    constexpr size_t AT_ONCE = 16;
+    constexpr size_t AT_ONCE = 16; // chosen from 16 to 24 by rays in dragon
     using Walk = PacketWalk<QUERY>;
     struct Memory {
         std::array<Walk, AT_ONCE> walks;
-        std::array<CandidatesOf<QUERY>, AT_ONCE * PACKET_WIDTH / 2 + 1> candidates;
+        std::array<CandidatesOf<QUERY>, AT_ONCE * PACKET_WIDTH / 2> candidates;
     };
     // Too much for the stacks of some threads.
     thread_local const auto memory = std::make_unique<Memory>();
-    const Scene scene(tree, triangles);
+    const WideScene scene(tree, triangles);
     const WideEntry entry(tree, packets);
     std::array<Walk *, AT_ONCE> running, at_node, at_block;
     size_t started = 0, left = 0;
@@ -311,9 +288,8 @@ void trace(const WideTree &tree, const Triangle *triangles,
         // Their distances are computed soon.
         if constexpr (QUERY == Query::closest) {
             const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(found.primitive);
-            for_each_lane(found.found, [&](uint32_t lane) {
-                prefetch(&triangles[primitives[lane]]);
-            });
+            for_each_lane(found.found,
+                          [&](uint32_t lane) { prefetch(&triangles[primitives[lane]]); });
         }
     };
     while (left < std::min(AT_ONCE, packets.size()))
