@@ -78,11 +78,9 @@ public:
                            least_error_);
         error = select(size < LARGEST_SIZE, error, Real(INFINITY));
         const Real least = minimum(u, minimum(v, w)), greatest = maximum(u, maximum(v, w));
-        Seen seen{};
+        Seen seen;
+        // Which rays see nothing is hard to foretell, so all is computed in any case.
         seen.possible = ALL_LANES & ~to_bits((least < -error) & (greatest > error));
-        // Which ray sees nothing is hard to foretell, so of one all is computed.
-        if (!ONE_RAY && seen.possible == 0)
-            return seen;
         seen.certain = to_bits((least > error) | (greatest < -error));
         const Real reciprocal = 1.0f / (u + v + w);
         const Real depth =

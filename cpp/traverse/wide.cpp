@@ -5,6 +5,7 @@
 #include "geometry/packet_distances.h"
 #include "geometry/triangle_test.h"
 #include "traverse/parameter_interval.h"
+#include "traverse/wide_scene.h"
 
 #include <algorithm>
 #include <array>
@@ -17,15 +18,6 @@
 namespace mlrt {
 
 namespace {
-
-// What all rays walk through.
-struct Scene {
-    const WideNode *nodes;
-    const WideBlock *blocks;
-    uint64_t from_nodes_to_blocks; // in bytes
-    WideChild root;
-    const Triangle *triangles;
-};
 
 // A ray on its way through the tree: what waits to be visited is on a stack, the nearest on
 // top.
@@ -47,7 +39,7 @@ public:
 
     // Goes on to the nearest of the children that the ray enters, and puts the others on
     // the stack.
-    void visit_node(const Scene &scene) {
+    void visit_node(const WideScene &scene) {
         const WideNode &node = scene.nodes[next_.index()];
         const auto face = [&](uint16_t place) {
             return load<FloatBlock>(reinterpret_cast<const float *>(
@@ -77,7 +69,7 @@ public:
     }
 
     // Looks at a block, which is left by one of the two ways below.
-    void visit_block(const Scene &scene, Counters &counters) {
+    void visit_block(const WideScene &scene, Counters &counters) {
         const WideBlock &block = scene.blocks[next_.index()];
         const auto &[axis_x, axis_y, axis_z, unused] = ray_.axes;
         const auto &[x, y, z] = ray_.ordered_origin;
@@ -96,9 +88,9 @@ public:
         store(farthest_.data(), seen.farthest);
     }
     bool has_candidates() const { return candidates_ != 0; }
-    void leave_block(const Scene &scene) { go_on(scene, pending_); }
+    void leave_block(const WideScene &scene) { go_on(scene, pending_); }
 
-    void test_candidates(const Scene &scene, const WideRays &rays, Counters &counters) {
+    void test_candidates(const WideScene &scene, const WideRays &rays, Counters &counters) {
         const WideBlock &block = scene.blocks[next_.index()];
         const float to = ray_.best_to;
         for_each_lane(candidates_, [&](uint32_t lane) {
@@ -124,16 +116,10 @@ public:
 
 private:
     // To what is on top of the stack, whose memory it asks for.
-    void go_on(const Scene &scene, uint32_t pending) {
+    void go_on(const WideScene &scene, uint32_t pending) {
         pending_ = --pending;
         next_ = WideChild::from_bits(children_[pending]);
-        static_assert(sizeof(WideBlock) == sizeof(WideNode) + CACHE_LINE);
-        const auto of_block = -uint64_t(next_.is_block());
-        const uint64_t place = reinterpret_cast<uint64_t>(scene.nodes) +
-                               (scene.from_nodes_to_blocks & of_block) +
-                               next_.index() * sizeof(WideNode) +
-                               (next_.index() & of_block) * CACHE_LINE;
-        prefetch(reinterpret_cast<const WideBlock *>(place));
+        scene.prefetch_child(next_);
     }
 
     // Leaves on the stack only what may hold a nearer hit.
@@ -242,7 +228,7 @@ struct WaitingWalks {
 // Steps of a kind are done together: the longer a loop, the less often processors guess
 // wrong what comes next.
 template <Query QUERY>
-void trace(const Scene &scene, const WideRays &rays, Hit *hits, Counters &counters) {
+void trace(const WideScene &scene, const WideRays &rays, Hit *hits, Counters &counters) {
     constexpr size_t AT_ONCE = 24;      // chosen from 8 to 64 by incoherent rays in office
     constexpr size_t FEW = AT_ONCE / 2; // and conference
     using Walk = WideWalk<QUERY>;
@@ -330,10 +316,7 @@ void find_distances(const Triangle *triangles, const WideRays &rays, Hit *hits,
 
 void trace_wide(const WideTree &tree, const Triangle *triangles, const WideRays &rays,
                 Query query, Hit *hits, Counters &counters) {
-    const Scene scene{tree.nodes.data(), tree.blocks.data(),
-                      reinterpret_cast<uint64_t>(tree.blocks.data()) -
-                          reinterpret_cast<uint64_t>(tree.nodes.data()),
-                      tree.root, triangles};
+    const WideScene scene(tree, triangles);
     if (query == Query::any) {
         trace<Query::any>(scene, rays, hits, counters);
     } else {

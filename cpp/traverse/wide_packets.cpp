@@ -6,14 +6,16 @@
 #include "geometry/triangle_test.h"
 #include "traverse/packet_frustum.h"
 #include "traverse/parameter_interval.h"
-#include "traverse/take_turns.h"
 #include "traverse/wide_entry.h"
+#include "traverse/wide_scene.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
+#include <memory>
 
 namespace mlrt {
 
@@ -30,6 +32,19 @@ constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 // Not the distance of any hit.
 constexpr float UNKNOWN = -1;
 
+template <Query QUERY>
+class PacketWalk;
+
+// What two rays of a packet may hit of a block: triangles, for the second ray in the upper
+// lanes, which of them they certainly hit if the depth is right, and bounds of that.
+template <Query QUERY>
+struct CandidatesOf {
+    LaneArray<float> nearest, farthest;
+    PacketWalk<QUERY> *walk;
+    std::array<uint32_t, 2> rays;
+    LaneBits possible, certain;
+};
+
 // A packet on its way through the tree: for each node on the path the children that wait to
 // be visited.
 //
@@ -38,8 +53,10 @@ constexpr float UNKNOWN = -1;
 template <Query QUERY>
 class PacketWalk {
 public:
+    using Candidates = CandidatesOf<QUERY>;
+
     // At an entry of its group or, without one, at the root.
-    void start(const WideTree &tree, const WidePacket &packet, const WideNode *entry,
+    void start(const WideScene &scene, const WidePacket &packet, const WideNode *entry,
                uint32_t number) {
         number_ = number;
         rays_ = &packet.rays;
@@ -67,40 +84,33 @@ public:
         }
         level.boxes.faces[0][2][0] = 0;
         level.boxes.faces[1][2][0] = INFINITE;
-        level.children[0] = tree.root.bits();
+        level.children[0] = scene.root.bits();
         level.back_to_front = 0;
         level.waiting = 1;
         level.lanes = searching_;
         depth_ = 1;
     }
 
-    // Takes what is to be visited next, and asks for its memory. Returns whether there is
-    // anything.
-    bool next(const WideTree &tree) {
-        while (depth_ > 0) {
-            Level &level = levels_[depth_ - 1];
-            const uint32_t place = uint32_t(std::bit_width(level.waiting)) - 1;
-            level.waiting ^= 1u << place;
-            // What is below the last one takes its place.
-            depth_ -= level.waiting == 0;
-            const uint32_t child = level.back_to_front >> 4 * place & 7;
-            entered_ = level.lanes &
-                       frustum_.entering(level.boxes, child, load<FloatPacket>(best_to_));
-            if (entered_ == 0)
-                continue;
-            next_ = WideChild::from_bits(level.children[child]);
-            if (next_.is_block())
-                prefetch(&tree.blocks[next_.index()]);
-            else
-                prefetch(&tree.nodes[next_.index()]);
-            return true;
-        }
-        return false;
+    // Takes a child that waits, one at least, and asks for its memory.
+    void take(const WideScene &scene) {
+        Level &level = levels_[depth_ - 1];
+        const uint32_t place = uint32_t(std::bit_width(level.waiting)) - 1;
+        level.waiting ^= 1u << place;
+        // What is below the last one takes its place.
+        depth_ -= level.waiting == 0;
+        const uint32_t child = level.back_to_front >> 4 * place & 7;
+        entered_ = level.lanes &
+                   frustum_.entering(level.boxes, child, load<FloatPacket>(best_to_));
+        next_ = WideChild::from_bits(level.children[child]);
+        scene.prefetch_child(next_);
     }
+    bool is_at_end() const { return depth_ == 0; }
+    // What was taken last: whether rays enter it, and whether it is a block.
+    bool is_entered() const { return entered_ != 0; }
     bool is_at_block() const { return next_.is_block(); }
 
     // Lets those children wait that rays may enter.
-    void visit_node(const WideTree &tree) { visit(tree.nodes[next_.index()]); }
+    void visit_node(const WideScene &scene) { visit(scene.nodes[next_.index()]); }
     void visit(const WideNode &node) {
         Level &level = levels_[depth_];
         const MaskOf<FloatBlock> entered = frustum_.entered_by(entered_, node, level.boxes);
@@ -113,15 +123,17 @@ public:
         depth_ += level.waiting != 0;
     }
 
-    void visit_block(const WideTree &tree, const Triangle *triangles, Counters &counters) {
-        const WideBlock &block = tree.blocks[next_.index()];
+    // Adds what its rays may hit of a block.
+    Candidates *visit_block(const WideScene &scene, Candidates *found, Counters &counters) {
+        const WideBlock &block = scene.blocks[next_.index()];
         const BlockVolumes volumes(block.coordinates, frustum_.axes, frustum_.origin,
                                    frustum_.side);
         const LaneBits there =
             to_bits(load<UIntBlock>(block.numbers.data()) != UIntBlock(NO_PRIMITIVE));
         counters.triangle_tests +=
             uint64_t(std::popcount(there)) * uint64_t(std::popcount(entered_));
-        for (LaneBits left = entered_; left != 0;) {
+        LaneBits left = entered_;
+        do {
             const auto first = uint32_t(std::countr_zero(left));
             left &= left - 1;
             const bool two = left != 0;
@@ -132,32 +144,39 @@ public:
             };
             const BlockVolumes::Seen seen =
                 volumes.seen_by(of_both(frustum_.slopes[0]), of_both(frustum_.slopes[1]));
-            LaneBits possible =
-                seen.possible & (two ? there | there << BLOCK_WIDTH : there);
-            if (possible == 0)
-                continue;
-            possible &= ~to_bits((seen.nearest > of_both(best_to_)) |
-                                 (seen.farthest < FloatPacket(0.0f)));
-            if (possible == 0)
-                continue;
-            const auto nearest = to_lanes<float>(seen.nearest),
-                       farthest = to_lanes<float>(seen.farthest);
-            for_each_lane(possible, [&](uint32_t lane) {
-                const uint32_t ray = lane < BLOCK_WIDTH ? first : second;
-                const uint32_t place = lane % BLOCK_WIDTH;
-                const uint32_t primitive = block.numbers[place];
-                // Of large triangles many blocks have a copy.
-                if (primitive == best_[ray] || nearest[lane] > best_to_[ray])
-                    return;
-                const bool certain = seen.certain >> lane & 1;
-                if (certain && nearest[lane] > begin_[ray] &&
-                    farthest[lane] < best_from_[ray])
-                    set_best(ray, primitive, UNKNOWN, nearest[lane], farthest[lane]);
-                else
-                    decide(ray, block.triangle(place), primitive, certain, triangles,
-                           counters);
-            });
-        }
+            const LaneBits possible = seen.possible &
+                                      (there | (two ? there << BLOCK_WIDTH : 0)) &
+                                      ~to_bits((seen.nearest > of_both(best_to_)) |
+                                               (seen.farthest < FloatPacket(0.0f)));
+            found->walk = this;
+            found->rays = {first, second};
+            found->possible = possible;
+            found->certain = seen.certain;
+            store(found->nearest.data(), seen.nearest);
+            store(found->farthest.data(), seen.farthest);
+            found += possible != 0;
+        } while (left != 0);
+        return found;
+    }
+
+    void test(const WideScene &scene, const Candidates &candidates, Counters &counters) {
+        const WideBlock &block = scene.blocks[next_.index()];
+        for_each_lane(candidates.possible, [&](uint32_t lane) {
+            const uint32_t ray = candidates.rays[lane / BLOCK_WIDTH];
+            const uint32_t place = lane % BLOCK_WIDTH;
+            const uint32_t primitive = block.numbers[place];
+            const float nearest = candidates.nearest[lane],
+                        farthest = candidates.farthest[lane];
+            // Of large triangles many blocks have a copy.
+            if (primitive == best_[ray] || nearest > best_to_[ray])
+                return;
+            const bool certain = candidates.certain >> lane & 1;
+            if (certain && nearest > begin_[ray] && farthest < best_from_[ray])
+                set_best(ray, primitive, UNKNOWN, nearest, farthest);
+            else
+                decide(ray, block.triangle(place), primitive, certain, scene.triangles,
+                       counters);
+        });
     }
 
     uint32_t number() const { return number_; }
@@ -241,30 +260,69 @@ private:
     std::array<Level, MAX_WIDE_DEPTH + 1> levels_;
 };
 
+// Takes packets to their ends, AT_ONCE of them at a time, as a step mostly waits for
+// memory. Steps of a kind are done together, and walks are sorted by what they do next
+// without branches: processors lose more by guessing it wrong.
 template <Query QUERY>
 void trace(const WideTree &tree, const Triangle *triangles,
            std::span<const WidePacket> packets, WideHits *hits, Counters &counters) {
-    constexpr size_t AT_ONCE = 16; // chosen from 5 to 24 by rays in dragon
+    constexpr size_t AT_ONCE = 16; // chosen from 16 to 24 by rays in dragon
     using Walk = PacketWalk<QUERY>;
+    struct Memory {
+        std::array<Walk, AT_ONCE> walks;
+        std::array<CandidatesOf<QUERY>, AT_ONCE * PACKET_WIDTH / 2> candidates;
+    };
+    // Too much for the stacks of some threads.
+    thread_local const auto memory = std::make_unique<Memory>();
+    const WideScene scene(tree, triangles);
     const WideEntry entry(tree, packets);
-    uint32_t started = 0;
-    take_turns<Walk, AT_ONCE>(
-        tree, packets.size(), counters,
-        [&](Walk &walk) {
-            const WidePacket &packet = packets[started];
-            walk.start(tree, packet, entry.of(packet), started++);
-        },
-        [&](Walk &walk) { walk.visit_block(tree, triangles, counters); },
-        [&](const Walk &walk) {
-            const WideHits &found = hits[walk.number()] = walk.hits();
-            // Their distances are computed soon.
-            if constexpr (QUERY == Query::closest) {
-                const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(found.primitive);
-                for_each_lane(found.found, [&](uint32_t lane) {
-                    prefetch(&triangles[primitives[lane]]);
-                });
+    std::array<Walk *, AT_ONCE> running, at_node, at_block;
+    size_t started = 0, left = 0;
+    const auto start = [&](Walk *walk) {
+        const WidePacket &packet = packets[started];
+        walk->start(scene, packet, entry.of(packet), uint32_t(started++));
+        running[left++] = walk;
+    };
+    const auto finish = [&](const Walk &walk) {
+        const WideHits &found = hits[walk.number()] = walk.hits();
+        // Their distances are computed soon.
+        if constexpr (QUERY == Query::closest) {
+            const LaneArray<uint32_t> primitives = to_lanes<uint32_t>(found.primitive);
+            for_each_lane(found.found,
+                          [&](uint32_t lane) { prefetch(&triangles[primitives[lane]]); });
+        }
+    };
+    while (left < std::min(AT_ONCE, packets.size()))
+        start(&memory->walks[left]);
+    while (left > 0) {
+        size_t nodes = 0, blocks = 0;
+        for (size_t i = 0; i < left;) {
+            Walk *const walk = running[i];
+            if (walk->is_at_end()) {
+                finish(*walk);
+                running[i] = running[--left];
+                if (started < packets.size())
+                    start(walk);
+                continue;
             }
-        });
+            walk->take(scene);
+            at_node[nodes] = at_block[blocks] = walk;
+            const size_t entered = walk->is_entered(), is_block = walk->is_at_block();
+            nodes += entered & ~is_block;
+            blocks += entered & is_block;
+            ++i;
+        }
+        counters.traversal_steps += nodes + blocks;
+        counters.leaf_visits += blocks;
+        for (size_t i = 0; i < nodes; ++i)
+            at_node[i]->visit_node(scene);
+        CandidatesOf<QUERY> *const candidates = memory->candidates.data(),
+                                   *end = candidates;
+        for (size_t i = 0; i < blocks; ++i)
+            end = at_block[i]->visit_block(scene, end, counters);
+        for (const CandidatesOf<QUERY> *next = candidates; next < end; ++next)
+            next->walk->test(scene, *next, counters);
+    }
 }
 
 } // namespace
