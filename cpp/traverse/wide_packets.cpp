@@ -266,7 +266,7 @@ private:
 template <Query QUERY>
 void trace(const WideTree &tree, const Triangle *triangles,
            std::span<const WidePacket> packets, WideHits *hits, Counters &counters) {
-    constexpr size_t AT_ONCE = 16; // chosen from 16 to 24 by rays in dragon
+    constexpr size_t AT_ONCE = 16; // chosen from 12 to 24 by rays in dragon
     using Walk = PacketWalk<QUERY>;
     struct Memory {
         std::array<Walk, AT_ONCE> walks;
