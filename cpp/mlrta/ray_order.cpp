@@ -21,6 +21,10 @@ namespace {
 // before all are sorted; chosen.
 constexpr float WIDER = 2;
 
+// The sum of the sides of a rectangle around rays that go to all sides: of the whole plane
+// it is 4, and of half a sphere at least 3. Chosen.
+constexpr float APART = 2;
+
 // Cells along the longer side of the plane, as bits; of all of them, and of a ray's number.
 constexpr uint32_t SIDE_BITS = 8, CELL_BITS = 2 * SIDE_BITS, NUMBER_BITS = 16;
 static_assert(RayOrder::MOST_RAYS <= 1u << NUMBER_BITS && CELL_BITS + NUMBER_BITS == 32);
@@ -44,6 +48,20 @@ struct Extent {
     float width() const { return greatest_lane(hi_x) - least_lane(lo_x); }
     float height() const { return greatest_lane(hi_y) - least_lane(lo_y); }
 };
+
+// Where sixteen directions are in the plane, those of a group from `first` on. Within -1
+// and 1, unless a direction is not finite, or zero.
+Vec2<FloatPacket> load_in_plane(const RayGroup &rays, uint32_t first) {
+    const FloatPacket zero(0.0f), one(1.0f);
+    const FloatPacket dx = load_padded(rays.direction[0], first, rays.count);
+    const FloatPacket dy = load_padded(rays.direction[1], first, rays.count);
+    const FloatPacket dz = load_padded(rays.direction[2], first, rays.count);
+    const FloatPacket scale = one / (absolute(dx) + absolute(dy) + absolute(dz));
+    const FloatPacket x = dx * scale, y = dy * scale;
+    const auto below = dz < zero;
+    return {select(below, copy_sign(one - absolute(y), x), x),
+            select(below, copy_sign(one - absolute(x), y), y)};
+}
 
 // The box around directions, lane by lane.
 struct Box {
@@ -79,18 +97,11 @@ void RayOrder::map_to_plane(const RayGroup &rays) {
     const size_t padded = (count_ + PACKET_WIDTH - 1) / PACKET_WIDTH * PACKET_WIDTH;
     x_.resize(padded);
     y_.resize(padded);
-    const FloatPacket zero(0.0f), one(1.0f);
+    const FloatPacket one(1.0f);
     Extent all;
     float valid_x = 0, valid_y = 0;
     for (uint32_t i = 0; i < count_; i += PACKET_WIDTH) {
-        const FloatPacket dx = load_padded(rays.direction[0], i, count_);
-        const FloatPacket dy = load_padded(rays.direction[1], i, count_);
-        const FloatPacket dz = load_padded(rays.direction[2], i, count_);
-        const FloatPacket scale = one / (absolute(dx) + absolute(dy) + absolute(dz));
-        const FloatPacket x = dx * scale, y = dy * scale;
-        const auto below = dz < zero;
-        const FloatPacket plane_x = select(below, copy_sign(one - absolute(y), x), x);
-        const FloatPacket plane_y = select(below, copy_sign(one - absolute(x), y), y);
+        const auto [plane_x, plane_y] = load_in_plane(rays, i);
         store(&x_[i], plane_x);
         store(&y_[i], plane_y);
         const LaneBits valid =
@@ -188,6 +199,20 @@ bool are_in_order(const RayGroup &rays) {
         wider_sides += beams * square.longest_side();
     }
     return NARROWER * sides <= wider_sides;
+}
+
+bool go_apart(const RayGroup &rays) {
+    constexpr uint32_t STEP = RayNumbers::CAPACITY;
+    float sides = 0, packets = 0;
+    for (uint32_t first = 0; first + PACKET_WIDTH <= rays.count; first += STEP) {
+        const auto [x, y] = load_in_plane(rays, first);
+        Extent extent;
+        extent.add(x, y);
+        // Less than nothing if no direction is valid.
+        sides += std::max(extent.width() + extent.height(), 0.0f);
+        ++packets;
+    }
+    return sides > APART * packets;
 }
 
 } // namespace mlrt

@@ -45,4 +45,7 @@ private:
 // at a glance.
 bool are_in_order(const RayGroup &rays);
 
+// Whether neighbours go to all sides, at a glance.
+bool go_apart(const RayGroup &rays);
+
 } // namespace mlrt

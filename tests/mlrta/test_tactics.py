@@ -71,3 +71,36 @@ def test_both_ways_find_what_brute_force_does(core: ModuleType, rays_of: RaysOf)
         closest(tree, rays, options, t_max=t_max).assert_same(expected)
         hit = occluded(tree, rays, options, t_max=t_max)
         assert np.array_equal(hit, expected.face >= 0), SEED
+
+
+@each_core
+@pytest.mark.parametrize("count", [100, 256, COUNT])
+def test_rays_that_go_apart_take_the_wide_tree_at_once(
+    core: ModuleType, count: int
+) -> None:
+    """Where it is there they take as many steps as without a choice. Others may try all
+    ways."""
+    rng = np.random.default_rng(SEED)
+    tree = build(core, workloads.soup(rng, 3000, 0.05))
+    tree.widen()
+    for rays_of in (apart, together):
+        origins, directions = (array[:count].copy() for array in rays_of(rng))
+        if rays_of is apart:
+            directions[3::50] = np.nan
+            directions[5::50] = 0
+        rays = origins, directions
+        bounds = interval(rays, 0, np.inf)
+        steps: dict[tuple[str, str], int] = {}
+        for traversal in ("adaptive", "wide"):
+            counters: dict[str, int] = {}
+            tree.closest_hit(*rays, *bounds, {"traversal": traversal}, counters)
+            steps[traversal, "closest"] = counters["traversal_steps"]
+            tree.any_hit(*rays, *bounds, {"traversal": traversal}, counters)
+            steps[traversal, "any"] = counters["traversal_steps"]
+        is_same = steps["adaptive", "closest"] == steps["wide", "closest"]
+        assert is_same == (rays_of is apart), SEED
+        if rays_of is apart:
+            assert steps["adaptive", "any"] == steps["wide", "any"], SEED
+        closest(tree, rays, ADAPTIVE).assert_same(closest(tree, rays, BRUTE_FORCE))
+        expected = closest(tree, rays, BRUTE_FORCE).face >= 0
+        assert np.array_equal(occluded(tree, rays, ADAPTIVE), expected), SEED
