@@ -10,6 +10,7 @@
 #pragma once
 
 #include "base/mask_register.h"
+#include "base/prefetch.h"
 #include "base/vec.h"
 
 #include <array>
@@ -369,18 +370,6 @@ void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
     std::array<Value, drjit::size_v<Packet>> lanes;
     store(lanes.data(), packet);
     for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
-}
-
-inline constexpr size_t CACHE_LINE = 64;
-
-// Asks for the cache lines of an object that will be read soon.
-template <typename Object>
-void prefetch(const Object *object) {
-    const char *bytes = reinterpret_cast<const char *>(object);
-    for (size_t at = 0; at < sizeof(Object); at += CACHE_LINE)
-        __builtin_prefetch(bytes + at);
-    if constexpr (CACHE_LINE % sizeof(Object) != 0 && alignof(Object) < CACHE_LINE)
-        __builtin_prefetch(bytes + sizeof(Object) - 1);
 }
 
 // The same vector in all lanes.

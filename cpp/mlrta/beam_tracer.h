@@ -332,8 +332,8 @@ private:
     static constexpr uint32_t FIRST_LOOK_AT_HUGE_BEAM = 60;
     static constexpr float LEAST_YIELD_OF_HUGE_BEAM = 30;
     // Shadow rays are not looked at how they lie to each other in such a beam, so that it
-    // had better meet few triangles, as the beams before it did. Chosen from 0.01 to 0.2 and
-    // from 40 to 300 by shadow rays of office, conference, building and sponza.
+    // had better meet few triangles, as the beams before it did. Chosen from 0.01 to 0.2
+    // and from 40 to 300 by shadow rays of office, conference, building and sponza.
     static constexpr uint32_t MOST_OF_HUGE_BEAM = Output::query == Query::any ? 120 : 160;
     static constexpr float HUGE_TRIANGLES_PER_RAY = 0.03f;
 
