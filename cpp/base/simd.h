@@ -79,8 +79,7 @@ T select(const MaskOf<T> &mask, const T &if_true, const T &if_false) {
     return drjit::select(mask, if_true, if_false);
 }
 
-// The lesser (greater) of both; the second operand where they are unordered, as x86 does it
-// in one instruction.
+// The lesser (greater) of both; the second operand where they are unordered, as on x86.
 template <typename T>
 T minimum(const T &a, const T &b) {
     if constexpr (std::is_arithmetic_v<T>) {
@@ -194,11 +193,9 @@ inline uint32_t union_of_lanes(const UIntPacket &a) {
 #if defined(__AVX512F__)
     return uint32_t(_mm512_reduce_or_epi32(a.m));
 #else
-    // In halves: what has no instruction of its own is done lane by lane.
     const auto eight = drjit::low(a) | drjit::high(a);
     const auto four = drjit::low(eight) | drjit::high(eight);
-    const auto two = drjit::low(four) | drjit::high(four);
-    return two.entry(0) | two.entry(1);
+    return four.entry(0) | four.entry(1) | four.entry(2) | four.entry(3);
 #endif
 }
 
