@@ -85,15 +85,4 @@ load_three_columns(const std::array<const float *, QUARTERS> &places) {
 #endif
 }
 
-// Lanes 0 to 3 to values + places[0], and so on.
-inline void store_quarters(float *values, const std::array<uint32_t, QUARTERS> &places,
-                           const FloatPacket &packet) {
-    const auto store_half = [&](size_t i, const auto &half) {
-        drjit::store(values + places[i], drjit::low(half));
-        drjit::store(values + places[i + 1], drjit::high(half));
-    };
-    store_half(0, drjit::low(packet));
-    store_half(2, drjit::high(packet));
-}
-
 } // namespace mlrt
