@@ -61,7 +61,7 @@ def beams_of(tree: object, rays: workloads.Rays, traversal: str) -> dict[str, in
 
 @each_core
 @pytest.mark.parametrize("traversal", ["beam_leaf", "adaptive"])
-@pytest.mark.parametrize("occluders", [0, 3, 30, 300])
+@pytest.mark.parametrize("occluders", [0, 3, 30, 300, 2000])
 def test_they_find_what_brute_force_finds(
     core: ModuleType, traversal: str, occluders: int
 ) -> None:
@@ -84,7 +84,7 @@ def test_few_beams_are_enough_for_a_free_floor(core: ModuleType) -> None:
 
 @each_core
 def test_rays_are_counted_once_if_the_largest_beams_are_divided(core: ModuleType) -> None:
-    scene, rays = lit_floor(np.random.default_rng(SEED), 300, 4)
+    scene, rays = lit_floor(np.random.default_rng(SEED), 2000, 4)
     counters = beams_of(build(core, scene), rays, "beam_leaf")
     assert counters["beams"] >= len(rays[0]) // LARGE
     assert counters["rays"] == len(rays[0])
