@@ -98,7 +98,8 @@ using Lanes = FloatWide;
     return active;
 }
 
-// The axis along which an active ray in the middle moves most.
+// The axis along which the ray in the middle moves most. It need not be active: any axis
+// would do, though bounds are narrower along this one.
 int main_axis(const RayGroup &rays, uint32_t first, uint32_t count) {
     const uint32_t middle = first + count / 2;
     const Vec3f size = abs(Vec3f{rays.direction[0][middle], rays.direction[1][middle],

@@ -15,16 +15,18 @@ struct Tile {
     uint32_t first, count;
 };
 
-// Calls visit(child) for each part of a tile, in order: split_factor equal runs of whole
-// packets, or fewer where the last ones would be empty. A tile of one packet has one part,
-// itself.
+// Calls visit(child) for each part of a tile, in order: split_factor equal runs, of packets
+// by a power of four so that squares stay whole, or fewer where the last ones would be
+// empty. A tile of one packet has one part, itself.
 template <typename Visit>
 void for_each_child(Tile tile, uint32_t split_factor, Visit &&visit) {
     const uint32_t share = (tile.count + split_factor - 1) / split_factor;
-    const uint32_t packets = (share + PACKET_WIDTH - 1) / PACKET_WIDTH;
-    const uint32_t step = packets * PACKET_WIDTH;
-    for (uint32_t offset = 0; offset < tile.count; offset += step)
-        visit(Tile{tile.first + offset, std::min(step, tile.count - offset)});
+    uint64_t step = PACKET_WIDTH;
+    while (step < share)
+        step *= 4;
+    for (uint64_t offset = 0; offset < tile.count; offset += step)
+        visit(Tile{tile.first + uint32_t(offset),
+                   uint32_t(std::min(step, tile.count - offset))});
 }
 
 } // namespace mlrt
