@@ -61,7 +61,7 @@ private:
         if constexpr (Output::query == Query::any) {
             // Neighbouring tiles are often covered by the same triangle.
             const uint32_t last = last_blocker();
-            if (has_beams() && last < tree_.triangles.size())
+            if (has_beams() && last != NO_PRIMITIVE)
                 judge.try_blocker(last);
             if (stopped_by_blocker(first, count, judge)) {
                 cost.add_to_run(first, count);
@@ -131,13 +131,12 @@ private:
                                         : active(load_packet<LaneOrigins>(rays_, first)));
     }
 
-    // The last triangle that stopped all rays of a tile; of another scene if that had its
-    // place in memory before.
+    // The last triangle that stopped all rays of a tile.
     struct LastBlocker {
         uint32_t primitive = NO_PRIMITIVE;
     };
     uint32_t &last_blocker() const {
-        return kept_by_thread<LastBlocker, LastBlocker>(&tree_).primitive;
+        return kept_by_thread<LastBlocker, LastBlocker>(tree_).primitive;
     }
 
     const KdTree &tree_;
