@@ -23,8 +23,13 @@ inline constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 // Not the distance of any hit.
 inline constexpr float UNKNOWN_DISTANCE = -1;
 
-// Of rays with a t_min and t_max, scalars or packets: hits deeper than this are certainly
-// past t_min, and an end at t_max has a depth between these.
+// Of rays with a t_min and t_max, scalars or packets: hits less deep than the first are
+// certainly not past t_min, though the surface that a ray starts on is met there; those
+// deeper than the second are; and an end at t_max has a depth between the others.
+template <typename Real>
+Real last_depth_before(const Real &t_min, const Real &size) {
+    return maximum(t_min * size * (1 - WIDEN_DEPTH) - LEAST_DEPTH, Real(0.0f));
+}
 template <typename Real>
 Real first_certain_depth(const Real &t_min, const Real &size) {
     return maximum(t_min, Real(SMALLEST_DISTANCE)) * size * (1 + WIDEN_DEPTH) + LEAST_DEPTH;

@@ -79,7 +79,7 @@ public:
         counters.triangle_tests += uint64_t(std::popcount(there));
         candidates_ = seen.possible & there &
                       ~to_bits((seen.nearest > FloatBlock(ray_.best.to)) |
-                               (seen.farthest < FloatBlock(0.0f)));
+                               (seen.farthest < FloatBlock(ray_.before)));
         certain_ = seen.certain;
         store(nearest_.data(), seen.nearest);
         store(farthest_.data(), seen.farthest);

@@ -103,13 +103,13 @@ void set_triangles(Columns &columns, const RayPacket<LaneOrigins> &rays) {
     columns.set(offsetof(WideRay, size), size);
     columns.set(offsetof(WideRay, per_size), 1.0f / size);
 
+    columns.set(offsetof(WideRay, before), last_depth_before(rays.t_min, size));
     columns.set(offsetof(WideRay, begin), first_certain_depth(rays.t_min, size));
     constexpr size_t BEST = offsetof(WideRay, best);
     columns.set(BEST + offsetof(DepthHit, primitive), UIntPacket(NO_PRIMITIVE));
     columns.set(BEST + offsetof(DepthHit, distance), FloatPacket(UNKNOWN_DISTANCE));
     columns.set(BEST + offsetof(DepthHit, from), least_depth_of_end(rays.t_max, size));
     columns.set(BEST + offsetof(DepthHit, to), greatest_depth_of_end(rays.t_max, size));
-    columns.set(offsetof(WideRay, unused), UIntPacket(0u));
 }
 
 } // namespace

@@ -32,9 +32,9 @@ struct alignas(CACHE_LINE) WideRay {
     std::array<float, 3> ordered_origin; // by these axes
     std::array<float, 2> slopes;         // of the first two to |d_k|
     float side, size, per_size;          // sign of d_k, |d_k| and its reciprocal
-    float begin;                         // the depth from which on hits count for certain
+    // Depths up to which hits certainly do not count, and from which on they do.
+    float before, begin;
     DepthHit best;
-    uint32_t unused;
 };
 
 static_assert(sizeof(WideRay) == 2 * CACHE_LINE);

@@ -65,7 +65,12 @@ LINES = {
     "5 samples a pixel": rows(image(70, 70, 5)),
     "16 samples a pixel": rows(image(50, 40, 16)),
     "100 samples a pixel": rows(image(40, 40, 100))[5:],
-    "many rays": rows(image(600, 500)),
+    "two squares a tile": rows(image(400, 400)),
+    "three squares a tile": rows(image(512, 384)),
+    "three squares a tile, odd sides": rows(image(251, 799)),
+    "three squares a tile, 4 samples a pixel": rows(image(240, 240, 4)),
+    "three squares a tile, 100 samples a pixel": rows(image(45, 45, 100)),
+    "four squares a tile": rows(image(600, 500)),
     "holes": with_holes(),
 }
 
