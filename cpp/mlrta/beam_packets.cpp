@@ -74,7 +74,7 @@ FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last, uint32
     return masked(of_rays.active,
                   maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
                           (1 + WIDEN_DEPTH) +
-                      SMALLEST_DEPTH,
+                      LEAST_DEPTH,
                   0.0f);
 }
 

@@ -1,5 +1,5 @@
 // Hits of a ray by their depths t |d_k|, k being the axis along which triangles are seen
-// (block_volumes.h): what all walks through the wide tree decide by.
+// (block_volumes.h): what beams and all walks through the wide tree decide by.
 #pragma once
 
 #include "base/counters.h"
