@@ -2,6 +2,7 @@
 // whose ends are easy to foresee.
 #pragma once
 
+#include "base/partial_packets.h"
 #include "base/simd.h"
 #include "mlrta/beam_packets.h"
 

@@ -52,7 +52,7 @@ private:
     struct alignas(32) Plane : Planes<float> {};
     // Distances, and the lanes in which they are rounded correctly for certain.
     struct Rounded {
-        FloatPacket values;
+        FloatWide values;
         LaneBits certain;
     };
 
@@ -63,7 +63,7 @@ private:
     FloatPacket of_several(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                            const UIntPacket &primitives, Counters &counters);
     template <typename Value>
-    [[gnu::always_inline]] static inline Rounded rounded(const Vec3<FloatPacket> &direction,
+    [[gnu::always_inline]] static inline Rounded rounded(const Vec3<FloatWide> &direction,
                                                          const Planes<Value> &planes);
     FloatPacket with_ones(FloatPacket distances, const RayGroup &rays, uint32_t first_ray,
                           LaneBits open, const UIntPacket &primitives,
