@@ -106,14 +106,14 @@ inline std::array<FloatPacket, 4> load_four_columns(const float *rows, size_t st
 #endif
 }
 
-// Sixteen packets, and a value of each.
-using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
+// A register of each of sixteen packets.
+using PacketRows = std::array<FloatWide, PACKET_WIDTH>;
 
 namespace simd_detail {
 
+// `better` keeps one of two values a lane. Halves the number of registers and of the values
+// that are left of each, until there is a value of each.
 #if defined(__AVX512F__)
-// `better` keeps one of two values a lane. Halves the number of packets and of the values
-// that are left of each, four times.
 template <typename Better>
 FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
     FloatPacket two[8], four[4];
@@ -135,62 +135,53 @@ FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
     return halved(halved(four[0], four[1]), halved(four[2], four[3]));
 }
 #elif defined(__AVX__)
-// The same of eight packets, of which lanes 0 to 7 and 8 to 15 come first.
 template <typename Better>
-FloatBlock best_lanes_of_eight(const FloatPacket *rows, Better &&better) {
-    __m256 two[4];
-    const auto better_of = [&](__m256 a, __m256 b) {
-        return better(FloatBlock(a), FloatBlock(b)).m;
-    };
+FloatBlock best_lanes_of_eight(const FloatWide *rows, Better &&better) {
+    FloatBlock two[4], four[2];
     for (int i = 0; i < 4; ++i) {
-        const FloatPacket &a = rows[2 * i], &b = rows[2 * i + 1];
-        const __m256 one = better(drjit::low(a), drjit::high(a)).m;
-        const __m256 other = better(drjit::low(b), drjit::high(b)).m;
-        two[i] =
-            better_of(_mm256_unpacklo_ps(one, other), _mm256_unpackhi_ps(one, other));
+        const __m256 a = rows[2 * i].m, b = rows[2 * i + 1].m;
+        two[i] = better(FloatBlock(_mm256_unpacklo_ps(a, b)),
+                        FloatBlock(_mm256_unpackhi_ps(a, b)));
     }
-    const auto four = [&](__m256 one, __m256 other) {
-        const __m256d a = _mm256_castps_pd(one), b = _mm256_castps_pd(other);
-        return better_of(_mm256_castpd_ps(_mm256_unpacklo_pd(a, b)),
-                         _mm256_castpd_ps(_mm256_unpackhi_pd(a, b)));
-    };
-    const __m256 a = four(two[0], two[1]), b = four(two[2], two[3]);
-    return FloatBlock(better_of(_mm256_permute2f128_ps(a, b, 0x20),
-                                _mm256_permute2f128_ps(a, b, 0x31)));
+    for (int i = 0; i < 2; ++i) {
+        const __m256d a = _mm256_castps_pd(two[2 * i].m);
+        const __m256d b = _mm256_castps_pd(two[2 * i + 1].m);
+        four[i] = better(FloatBlock(_mm256_castpd_ps(_mm256_unpacklo_pd(a, b))),
+                         FloatBlock(_mm256_castpd_ps(_mm256_unpackhi_pd(a, b))));
+    }
+    return better(FloatBlock(_mm256_permute2f128_ps(four[0].m, four[1].m, 0x20)),
+                  FloatBlock(_mm256_permute2f128_ps(four[0].m, four[1].m, 0x31)));
 }
 template <typename Better>
 FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
     return FloatPacket(best_lanes_of_eight(rows.data(), better),
                        best_lanes_of_eight(rows.data() + BLOCK_WIDTH, better));
 }
+#else
+template <typename Better>
+FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
+    LaneArray<float> best;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
+        best[i] = rows[i].entry(0);
+        for (uint32_t lane = 1; lane < WIDE_WIDTH; ++lane)
+            best[i] = better(best[i], float(rows[i].entry(lane)));
+    }
+    return load<FloatPacket>(best);
+}
 #endif
 
 } // namespace simd_detail
 
-// Lane i of the result is the least lane of packet i. Lanes must be ordered (no NaN).
+// Lane i of the result is the least lane of row i. Lanes must be ordered (no NaN).
 inline FloatPacket least_lanes(const PacketRows &rows) {
-#if defined(__AVX__)
     return simd_detail::best_lanes(
         rows, [](const auto &a, const auto &b) { return minimum(a, b); });
-#else
-    LaneArray<float> least;
-    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
-        least[i] = least_lane(rows[i]);
-    return load<FloatPacket>(least);
-#endif
 }
 
 // The same of the greatest lanes.
 inline FloatPacket greatest_lanes(const PacketRows &rows) {
-#if defined(__AVX__)
     return simd_detail::best_lanes(
         rows, [](const auto &a, const auto &b) { return maximum(a, b); });
-#else
-    LaneArray<float> greatest;
-    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
-        greatest[i] = greatest_lane(rows[i]);
-    return load<FloatPacket>(greatest);
-#endif
 }
 
 } // namespace mlrt

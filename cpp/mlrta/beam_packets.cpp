@@ -184,42 +184,45 @@ void BeamPackets::turn_as_rays() {
 // once more, with an error of at most 4 u (|u| + |v|).
 void BeamPackets::fit_rectangle() {
     const float c = rectangle.cosine, s = rectangle.sine;
-    const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
+    const Lanes first_u(rectangle.center_u), first_v(rectangle.center_v);
     // Packets that are missing, and lanes that are not active, bound nothing.
-    const FloatPacket none_lo(INFINITE), none_hi(-INFINITE);
-    FloatPacket lo_u = none_lo, hi_u = none_hi, lo_v = none_lo, hi_v = none_hi;
+    const Lanes none_lo(INFINITE), none_hi(-INFINITE);
+    Lanes lo_u = none_lo, hi_u = none_hi, lo_v = none_lo, hi_v = none_hi;
     // Of each packet of a run, a lane each.
     struct Extents {
         FloatPacket p0, p1, q0, q1;
     };
     std::array<Extents, RUNS> extents;
-    Extents widest{none_lo, none_hi, none_lo, none_hi};
+    Extents widest{INFINITE, -INFINITE, INFINITE, -INFINITE};
     for (uint32_t r = 0; r < run_count(); ++r) {
         PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
         for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
             const uint32_t n = r * PACKET_WIDTH + i;
-            if (n >= count || lanes[n].active == 0) {
-                lo_p[i] = lo_q[i] = least_of[i] = none_lo;
-                hi_p[i] = hi_q[i] = none_hi;
+            lo_p[i] = lo_q[i] = least_of[i] = none_lo;
+            hi_p[i] = hi_q[i] = none_hi;
+            if (n >= count || lanes[n].active == 0)
                 continue;
-            }
             const BeamPacket &packet = packets[n];
-            const auto active = from_bits<FloatPacket>(lanes[n].active);
-            // Inactive lanes repeat the first ray of all.
-            const FloatPacket u = select(active, packet.u, first_u);
-            const FloatPacket v = select(active, packet.v, first_v);
-            lo_u = minimum(u, lo_u);
-            hi_u = maximum(u, hi_u);
-            lo_v = minimum(v, lo_v);
-            hi_v = maximum(v, hi_v);
-            const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
-            const FloatPacket p = fused(du, FloatPacket(c), dv * s);
-            const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
-            lo_p[i] = select(active, p, none_lo);
-            hi_p[i] = select(active, p, none_hi);
-            lo_q[i] = select(active, q, none_lo);
-            hi_q[i] = select(active, q, none_hi);
-            least_of[i] = packet.least;
+            for_each_register([&](uint32_t lane) {
+                const auto active = from_bits<Lanes>(lanes[n].active >> lane);
+                const Lanes packet_u = load_register(packet.u, lane);
+                const Lanes packet_v = load_register(packet.v, lane);
+                // Inactive lanes repeat the first ray of all.
+                const Lanes u = select(active, packet_u, first_u);
+                const Lanes v = select(active, packet_v, first_v);
+                lo_u = minimum(u, lo_u);
+                hi_u = maximum(u, hi_u);
+                lo_v = minimum(v, lo_v);
+                hi_v = maximum(v, hi_v);
+                const Lanes du = packet_u - first_u, dv = packet_v - first_v;
+                const Lanes p = fused(du, Lanes(c), dv * s);
+                const Lanes q = fused(dv, Lanes(c), du * -s);
+                lo_p[i] = minimum(select(active, p, none_lo), lo_p[i]);
+                hi_p[i] = maximum(select(active, p, none_hi), hi_p[i]);
+                lo_q[i] = minimum(select(active, q, none_lo), lo_q[i]);
+                hi_q[i] = maximum(select(active, q, none_hi), hi_q[i]);
+                least_of[i] = minimum(load_register(packet.least, lane), least_of[i]);
+            });
         }
         store(runs[r].least.data(), least_lanes(least_of));
         const Extents &of_run = extents[r] = {least_lanes(lo_p), greatest_lanes(hi_p),
