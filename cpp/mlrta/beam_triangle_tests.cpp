@@ -214,8 +214,9 @@ template <Query query>
 bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
                                            uint32_t lane, uint32_t primitive) {
     const Seen seen = see(number, forms, lane);
-    const LaneBits found = to_bits(seen.possible & seen.certain & seen.nearer);
-    take(number, found, seen.lowest, seen.highest, primitive);
+    const auto hit = seen.possible & seen.certain & seen.nearer;
+    const LaneBits found = to_bits(hit);
+    take(number, hit, found, seen.lowest, seen.highest, primitive);
     const LaneBits open = EXACT ? to_bits(seen.possible) & ~found : 0;
     if (open != 0) [[unlikely]]
         return decide_open(number, forms, lane, primitive, open);
@@ -231,14 +232,13 @@ BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &form
     return true;
 }
 
-// Hits of a triangle at depths that have these bounds.
+// Hits of a triangle at depths that have these bounds. Lanes are given in both forms.
 template <Query query>
-void BeamTriangleTests<query>::take(uint32_t number, LaneBits lanes,
-                                    const FloatPacket &lowest, const FloatPacket &highest,
-                                    uint32_t primitive) {
+void BeamTriangleTests<query>::take(uint32_t number, const MaskOf<FloatPacket> &mask,
+                                    LaneBits lanes, const FloatPacket &lowest,
+                                    const FloatPacket &highest, uint32_t primitive) {
     BeamPacket &packet = beam_.packets[number];
     beam_.lanes[number].found |= lanes;
-    const auto mask = from_bits<FloatPacket>(lanes);
     if constexpr (query == Query::any) {
         packet.least = select(mask, FloatPacket(INFINITE), packet.least);
     } else {
@@ -282,7 +282,11 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
-    take(number, hits & nearest, seen.lowest, seen.highest, primitive);
+    const auto take_hits = [&](LaneBits of, const FloatPacket &lowest,
+                               const FloatPacket &highest) {
+        take(number, from_bits<FloatPacket>(of), of, lowest, highest, primitive);
+    };
+    take_hits(hits & nearest, seen.lowest, seen.highest);
     hits &= ~nearest;
     const UIntPacket challenger(primitive);
     tied &= hits;
@@ -310,7 +314,7 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         return;
 
     if constexpr (query == Query::any) {
-        take(number, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
+        take_hits(hits, FloatPacket(INFINITE), FloatPacket(INFINITE));
         return;
     }
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
@@ -319,9 +323,8 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         load_padded(rays_.direction[beam_.axes[2]], of_rays.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
-    take(number, hits,
-         minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
-         FloatPacket((1 + 0x1p-21) / (distance * main)), primitive);
+    take_hits(hits, minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
+              FloatPacket((1 + 0x1p-21) / (distance * main)));
 }
 
 // The same for rays that each have an origin, of Query::any.

@@ -69,8 +69,8 @@ private:
     bool decide_open(uint32_t packet, const TriangleForms &forms, uint32_t lane,
                      uint32_t primitive, LaneBits open);
     void decide(uint32_t packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
-    void take(uint32_t packet, LaneBits lanes, const FloatPacket &lowest,
-              const FloatPacket &highest, uint32_t primitive);
+    void take(uint32_t packet, const MaskOf<FloatPacket> &mask, LaneBits lanes,
+              const FloatPacket &lowest, const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(uint32_t packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
     void update_least(const BeamPackets::Packets &packets);
