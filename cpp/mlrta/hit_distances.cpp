@@ -110,12 +110,6 @@ void HitDistances::prepare(std::span<const uint32_t> primitives) {
     put_planes(missing);
 }
 
-const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
-    if (!knows(primitive)) [[unlikely]]
-        prepare({&primitive, 1});
-    return planes_[primitive % SIZE];
-}
-
 template <typename Value>
 HitDistances::Rounded HitDistances::rounded(const Vec3<FloatWide> &d,
                                             const Planes<Value> &planes) {
@@ -149,6 +143,39 @@ HitDistances::Rounded HitDistances::rounded(const Vec3<FloatWide> &d,
     return {values, to_bits((values == others) & (error <= LARGEST_ERROR))};
 }
 
+bool HitDistances::knows_all(const LaneArray<uint32_t> &primitives) const {
+    for (const uint32_t primitive : primitives)
+        if (!knows(primitive)) [[unlikely]]
+            return false;
+    return true;
+}
+
+// Returns the lanes of which that is not possible, as others take their places.
+[[gnu::noinline]] LaneBits HitDistances::prepare_all(const UIntPacket &primitives) {
+    std::array<uint32_t, PACKET_WIDTH> distinct;
+    uint32_t count = 0;
+    for_each_value(primitives, ALL_LANES,
+                   [&](uint32_t primitive, LaneBits) { distinct[count++] = primitive; });
+    prepare({distinct.data(), count});
+    LaneBits unknown = 0;
+    for_each_value(primitives, ALL_LANES, [&](uint32_t primitive, LaneBits holders) {
+        if (!knows(primitive))
+            unknown |= holders;
+    });
+    return unknown;
+}
+
+HitDistances::Planes<FloatWide> HitDistances::planes_of(const uint32_t *primitives) const {
+    std::array<const float *, WIDE_WIDTH> rows;
+    for (uint32_t lane = 0; lane < WIDE_WIDTH; ++lane)
+        rows[lane] = &planes_[primitives[lane] % SIZE].normal[0];
+    const auto columns = load_columns(rows);
+    return {{columns[0], columns[1], columns[2]},
+            columns[3],
+            {columns[4], columns[5], columns[6]},
+            columns[7]};
+}
+
 // All that needs a frame of the stack is called at the end, with no more arguments than go
 // into registers, so that this does without.
 FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
@@ -177,7 +204,8 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
                                                    LaneBits lanes,
                                                    const UIntPacket &primitives,
                                                    Counters &counters) {
-    plane_of(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
+    const uint32_t primitive = lane_of(primitives, uint32_t(std::countr_zero(lanes)));
+    prepare({&primitive, 1});
     return of(rays, first_ray, lanes, primitives, counters);
 }
 
@@ -187,37 +215,18 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
                                                        Counters &counters) {
     FloatPacket values;
     LaneBits open = lanes;
+    // Lanes that are not asked for have what another one has.
+    const UIntPacket any(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
+    const UIntPacket held = select(from_bits<UIntPacket>(lanes), primitives, any);
+    const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(held);
+    const LaneBits unknown = knows_all(numbers) ? 0 : prepare_all(held);
     for_each_register([&](uint32_t lane) {
-        Planes<FloatWide> planes;
-        const auto put = [&](uint32_t primitive, LaneBits holders) {
-            const Plane &plane = plane_of(primitive);
-            const auto mask = from_bits<FloatWide>(holders >> lane);
-            const auto put_value = [&](FloatWide &values, float value) {
-                values = select(mask, FloatWide(value), values);
-            };
-            for (int k = 0; k < 3; ++k) {
-                put_value(planes.normal[k], plane.normal[k]);
-                put_value(planes.rest[k], plane.rest[k]);
-            }
-            put_value(planes.anchor, plane.anchor);
-            put_value(planes.error, plane.error);
-        };
-        // From both ends, since there are few triangles, and one takes long to be told from
-        // the next.
-        for (LaneBits left = lanes & first_lanes(LANES_OF<FloatWide>) << lane; left != 0;) {
-            const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
-            const uint32_t other =
-                lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
-            const LaneBits of_one = to_bits(primitives == UIntPacket(one));
-            const LaneBits of_other = to_bits(primitives == UIntPacket(other));
-            put(one, of_one);
-            put(other, of_other);
-            left &= ~(of_one | of_other);
-        }
-        const Rounded part = rounded(directions_of(rays, first_ray + lane), planes);
+        const Rounded part =
+            rounded(directions_of(rays, first_ray + lane), planes_of(&numbers[lane]));
         store_register(values, lane, part.values);
         open &= ~(part.certain << lane);
     });
+    open |= lanes & unknown;
     if (open == 0)
         return values;
     return with_ones(values, rays, first_ray, open, primitives, counters);

@@ -56,7 +56,9 @@ private:
         LaneBits certain;
     };
 
-    const Plane &plane_of(uint32_t primitive);
+    bool knows_all(const LaneArray<uint32_t> &primitives) const;
+    LaneBits prepare_all(const UIntPacket &primitives);
+    Planes<FloatWide> planes_of(const uint32_t *primitives) const;
     void put_planes(const std::array<uint32_t, BLOCK_WIDTH> &primitives);
     FloatPacket of_new(const RayGroup &rays, uint32_t first_ray, LaneBits lanes,
                        const UIntPacket &primitives, Counters &counters);
