@@ -48,14 +48,13 @@ __m256i register_of(const Block &block) {
 
 } // namespace simd_detail
 
-// The first values, if `count` is less than there are lanes, and zeros; nothing behind them
-// is read. None if `count`, as a signed number, is negative.
+// The first values, fewer than there are lanes, and zeros; nothing behind them is read. Of
+// packets of one register among several, `count` may be less than zero, as a signed number.
 template <typename Packet = FloatPacket>
 [[gnu::always_inline]] inline Packet load_first(const float *values, uint32_t count) {
 #if defined(__AVX512F__)
     if constexpr (std::is_same_v<Packet, FloatPacket>)
-        return Packet(_mm512_maskz_loadu_ps(
-            __mmask16(first_lanes(int32_t(count) < 0 ? 0 : count)), values));
+        return Packet(_mm512_maskz_loadu_ps(__mmask16(first_lanes(count)), values));
 #endif
 #if defined(__AVX2__)
     const auto load_block = [&](int32_t first) {

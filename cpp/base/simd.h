@@ -44,6 +44,7 @@ inline constexpr uint32_t WIDE_WIDTH = BLOCK_WIDTH;
 using FloatWide = drjit::Packet<float, WIDE_WIDTH>;
 using DoubleWide = drjit::Packet<double, WIDE_WIDTH>;
 using IntWide = drjit::Packet<int32_t, WIDE_WIDTH>;
+using UIntWide = drjit::Packet<uint32_t, WIDE_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -330,12 +331,21 @@ template <typename Work>
         work(lane);
 }
 // That register of a packet.
+#if defined(__AVX512F__)
+inline void store_register(FloatPacket &packet, uint32_t, const FloatWide &values) {
+    packet = values;
+}
+inline const FloatWide &load_register(const FloatPacket &packet, uint32_t) {
+    return packet;
+}
+#else
 inline void store_register(FloatPacket &packet, uint32_t lane, const FloatWide &values) {
     drjit::store_aligned(reinterpret_cast<float *>(&packet) + lane, values);
 }
 inline FloatWide load_register(const FloatPacket &packet, uint32_t lane) {
     return drjit::load_aligned<FloatWide>(reinterpret_cast<const float *>(&packet) + lane);
 }
+#endif
 
 template <typename Value, typename Packet>
 LaneArray<Value> to_lanes(const Packet &packet) {

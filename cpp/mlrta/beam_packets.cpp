@@ -41,8 +41,8 @@ void BeamPackets::set_axes(Vec3f d) {
 }
 
 // A register at a time, as all of its values would not fit into them else.
-void BeamPackets::load_packet(const RayGroup &rays, uint32_t last, uint32_t number,
-                              FarthestEnds &farthest) {
+[[gnu::flatten]] void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                                               uint32_t number, FarthestEnds &farthest) {
     BeamPacket &packet = packets[number];
     PacketLanes &of_rays = lanes[number];
     const auto [i, j, k] = axes;
@@ -198,10 +198,11 @@ void BeamPackets::fit_rectangle() {
         PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
         for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
             const uint32_t n = r * PACKET_WIDTH + i;
-            lo_p[i] = lo_q[i] = least_of[i] = none_lo;
-            hi_p[i] = hi_q[i] = none_hi;
-            if (n >= count || lanes[n].active == 0)
+            if (n >= count || lanes[n].active == 0) {
+                lo_p[i] = lo_q[i] = least_of[i] = none_lo;
+                hi_p[i] = hi_q[i] = none_hi;
                 continue;
+            }
             const BeamPacket &packet = packets[n];
             for_each_register([&](uint32_t lane) {
                 const auto active = from_bits<Lanes>(lanes[n].active >> lane);
@@ -217,11 +218,15 @@ void BeamPackets::fit_rectangle() {
                 const Lanes du = packet_u - first_u, dv = packet_v - first_v;
                 const Lanes p = fused(du, Lanes(c), dv * s);
                 const Lanes q = fused(dv, Lanes(c), du * -s);
-                lo_p[i] = minimum(select(active, p, none_lo), lo_p[i]);
-                hi_p[i] = maximum(select(active, p, none_hi), hi_p[i]);
-                lo_q[i] = minimum(select(active, q, none_lo), lo_q[i]);
-                hi_q[i] = maximum(select(active, q, none_hi), hi_q[i]);
-                least_of[i] = minimum(load_register(packet.least, lane), least_of[i]);
+                const auto add = [&](Lanes &row, const Lanes &values, auto &&better) {
+                    row = lane == 0 ? values : better(values, row);
+                };
+                const auto lower = minimum<Lanes>, upper = maximum<Lanes>;
+                add(lo_p[i], select(active, p, none_lo), lower);
+                add(hi_p[i], select(active, p, none_hi), upper);
+                add(lo_q[i], select(active, q, none_lo), lower);
+                add(hi_q[i], select(active, q, none_hi), upper);
+                add(least_of[i], load_register(packet.least, lane), lower);
             });
         }
         store(runs[r].least.data(), least_lanes(least_of));

@@ -232,7 +232,7 @@ BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &form
     return true;
 }
 
-// Hits of a triangle at depths that have these bounds. Lanes are given in both forms.
+// Hits of a triangle at depths that have these bounds; `mask` has the same lanes.
 template <Query query>
 void BeamTriangleTests<query>::take(uint32_t number, const MaskOf<FloatPacket> &mask,
                                     LaneBits lanes, const FloatPacket &lowest,
@@ -282,11 +282,7 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         counters_.exact_tests += decision.precision == Precision::exact;
         hits |= LaneBits(decision.hit) << lane;
     });
-    const auto take_hits = [&](LaneBits of, const FloatPacket &lowest,
-                               const FloatPacket &highest) {
-        take(number, from_bits<FloatPacket>(of), of, lowest, highest, primitive);
-    };
-    take_hits(hits & nearest, seen.lowest, seen.highest);
+    take(number, hits & nearest, seen.lowest, seen.highest, primitive);
     hits &= ~nearest;
     const UIntPacket challenger(primitive);
     tied &= hits;
@@ -314,7 +310,7 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         return;
 
     if constexpr (query == Query::any) {
-        take_hits(hits, FloatPacket(INFINITE), FloatPacket(INFINITE));
+        take(number, hits, FloatPacket(INFINITE), FloatPacket(INFINITE), primitive);
         return;
     }
     // Of the distance, of the product, and of the reciprocal; and of a distance that is
@@ -323,8 +319,9 @@ void BeamTriangleTests<query>::decide(uint32_t number, LaneBits lanes, const See
         load_padded(rays_.direction[beam_.axes[2]], of_rays.first_ray, rays_.count)));
     const DoublePacket distance = to_double(t);
     const DoublePacket farthest = (distance + double(SMALLEST_FLOAT)) * main;
-    take_hits(hits, minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
-              FloatPacket((1 + 0x1p-21) / (distance * main)));
+    take(number, hits,
+         minimum(FloatPacket((1 - 0x1p-21) / farthest), FloatPacket(0x1p126f)),
+         FloatPacket((1 + 0x1p-21) / (distance * main)), primitive);
 }
 
 // The same for rays that each have an origin, of Query::any.

@@ -143,8 +143,15 @@ HitDistances::Rounded HitDistances::rounded(const Vec3<FloatWide> &d,
     return {values, to_bits((values == others) & (error <= LARGEST_ERROR))};
 }
 
-bool HitDistances::knows_all(const LaneArray<uint32_t> &primitives) const {
-    for (const uint32_t primitive : primitives)
+const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
+    if (!knows(primitive)) [[unlikely]]
+        prepare({&primitive, 1});
+    return planes_[primitive % SIZE];
+}
+
+bool HitDistances::knows_all(const UIntPacket &primitives) const {
+    const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitives);
+    for (const uint32_t primitive : numbers)
         if (!knows(primitive)) [[unlikely]]
             return false;
     return true;
@@ -165,11 +172,34 @@ bool HitDistances::knows_all(const LaneArray<uint32_t> &primitives) const {
     return unknown;
 }
 
-HitDistances::Planes<FloatWide> HitDistances::planes_of(const uint32_t *primitives) const {
-    std::array<const float *, WIDE_WIDTH> rows;
-    for (uint32_t lane = 0; lane < WIDE_WIDTH; ++lane)
-        rows[lane] = &planes_[primitives[lane] % SIZE].normal[0];
-    const auto columns = load_columns(rows);
+// Of triangles that are all known where that is asked for.
+HitDistances::Planes<FloatWide> HitDistances::planes_of(const UIntPacket &primitives,
+                                                        uint32_t lane) {
+    std::array<FloatWide, 8> columns;
+    if constexpr (BY_TRIANGLE) {
+        // From both ends, since there are few triangles, and one takes long to be told from
+        // the next.
+        const auto put = [&](uint32_t primitive, LaneBits holders) {
+            const float *const row = plane_of(primitive).normal;
+            const auto mask = from_bits<FloatWide>(holders);
+            for (size_t n = 0; n < columns.size(); ++n)
+                columns[n] = select(mask, FloatWide(row[n]), columns[n]);
+        };
+        for (LaneBits left = ALL_LANES; left != 0;) {
+            const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
+            const uint32_t other = lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
+            const LaneBits of_one = to_bits(primitives == UIntPacket(one));
+            const LaneBits of_other = to_bits(primitives == UIntPacket(other));
+            put(one, of_one);
+            put(other, of_other);
+            left &= ~(of_one | of_other);
+        }
+    } else {
+        std::array<const float *, WIDE_WIDTH> rows;
+        for (uint32_t n = 0; n < WIDE_WIDTH; ++n)
+            rows[n] = planes_[lane_of(primitives, lane + n) % SIZE].normal;
+        columns = load_columns(rows);
+    }
     return {{columns[0], columns[1], columns[2]},
             columns[3],
             {columns[4], columns[5], columns[6]},
@@ -218,11 +248,10 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
     // Lanes that are not asked for have what another one has.
     const UIntPacket any(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
     const UIntPacket held = select(from_bits<UIntPacket>(lanes), primitives, any);
-    const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(held);
-    const LaneBits unknown = knows_all(numbers) ? 0 : prepare_all(held);
+    const LaneBits unknown = BY_TRIANGLE || knows_all(held) ? 0 : prepare_all(held);
     for_each_register([&](uint32_t lane) {
         const Rounded part =
-            rounded(directions_of(rays, first_ray + lane), planes_of(&numbers[lane]));
+            rounded(directions_of(rays, first_ray + lane), planes_of(held, lane));
         store_register(values, lane, part.values);
         open &= ~(part.certain << lane);
     });
