@@ -116,6 +116,13 @@ def occluded(
     return np.asarray(tree.any_hit(*rays, *interval(rays, t_min, t_max), options), bool)
 
 
+def beam_steps(tree: Any, rays: Rays, options: Options) -> int:
+    """Returns how many nodes the beams of rays visit."""
+    counters: dict[str, int] = {}
+    tree.closest_hit(*rays, *interval(rays, 0, np.inf), options, counters)
+    return counters["beam_steps"]
+
+
 def build(core: ModuleType, scene: Scene, **options: Any) -> Any:
     """Returns the tree of a scene."""
     return core.KdTree(*scene, **options)

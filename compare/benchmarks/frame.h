@@ -66,15 +66,6 @@ struct Block {
     LaneBits on_film; // rays that there are
 };
 
-// Every second bit of a number, from the lowest, side by side.
-constexpr uint32_t even_bits(uint32_t bits) {
-    bits &= 0x55555555u;
-    bits = (bits | bits >> 1) & 0x33333333u;
-    bits = (bits | bits >> 2) & 0x0f0f0f0fu;
-    bits = (bits | bits >> 4) & 0x00ff00ffu;
-    return (bits | bits >> 8) & 0x0000ffffu;
-}
-
 constexpr uint32_t lane_x(uint32_t lane) {
     return even_bits(lane);
 }
@@ -204,7 +195,7 @@ inline void write_block(const View &view, const Block &block, const FloatPacket 
         });
 }
 
-// Side of the squares of rays that threads take; chosen, as MLRT's usual tile.
+// Side of the squares of rays that threads take; chosen.
 inline constexpr uint32_t SHARE_SIDE = 128;
 
 // Calls render(share) for squares that cover the film, on all threads of the pool. Their

@@ -43,6 +43,17 @@ EmbreeMode embree_mode_from(const std::string &name) {
     refuse_value("mode must be r16, NM8, NM16 or 1M.");
 }
 
+const EnumNames<ArrayMode> ARRAY_MODES{{"r16 coherent", ArrayMode::coherent_packets},
+                                       {"r16 incoherent", ArrayMode::incoherent_packets},
+                                       {"1M incoherent", ArrayMode::single_rays}};
+
+ArrayMode array_mode_from(const std::string &name) {
+    for (const auto &[known, mode] : ARRAY_MODES)
+        if (name == known)
+            return mode;
+    refuse_value("mode must be r16 coherent, r16 incoherent or 1M incoherent.");
+}
+
 Mesh mesh_from(const Points &vertices, const Faces &faces) {
     Mesh mesh;
     mesh.vertices.resize(vertices.shape(0) + 1);
@@ -277,18 +288,22 @@ void bind_embree(nb::module_ &m) {
         .def(
             "closest_hit",
             [](const EmbreeScene &self, const Points &origins, const Points &directions,
-               const Distances &t, const Numbers &primitives, bool coherent) {
+               const Distances &t, const Numbers &primitives, const std::string &mode) {
                 const size_t count = origins.shape(0);
                 if (directions.shape(0) != count || t.shape(0) != count ||
                     primitives.shape(0) != count)
                     refuse_value("origins, directions, t and primitives must have the same "
                                  "length.");
+                const ArrayMode chosen = array_mode_from(mode);
                 nb::gil_scoped_release release;
-                closest_hits(self, origins.data(), directions.data(), count, coherent,
+                closest_hits(self, origins.data(), directions.data(), count, chosen,
                              t.data(), primitives.data());
             },
             nb::arg("origins"), nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
-            nb::arg("coherent") = false, "Writes the nearest hits of rays.")
+            nb::arg("mode") = "r16 incoherent",
+            "Writes the nearest hits of rays, in one of the modes r16 coherent, r16 "
+            "incoherent "
+            "and 1M incoherent.")
         .def_prop_ro("seconds", [](const EmbreeScene &self) { return self.seconds(); })
         .def_prop_ro("bytes", &EmbreeScene::bytes)
         .def_prop_ro("peak_bytes", &EmbreeScene::peak_bytes)

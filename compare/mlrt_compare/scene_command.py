@@ -76,8 +76,9 @@ def scene_parser() -> argparse.ArgumentParser:
         "and tells whether they agree.",
         epilog="Exit codes: 0 the images agree, 2 they do not, 4 could not run. Other "
         "commands, each with its own --help: image, which compares EXR files; ztest, which "
-        "tests renders as Mitsuba tests its own; speed-error, which measures error over "
-        "time; sweep, which compares many scenes.",
+        "tests renders as Mitsuba tests its own; parity, which sets rays apart that hit "
+        "different things; speed-error, which measures error over time; sweep, which "
+        "compares many scenes; paper, which repeats the tables of the MLRTA paper.",
     )
     add_scene_options(parser)
     parser.add_argument("--spp", type=at_least(1), help="samples a pixel (the scene's)")

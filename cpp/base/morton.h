@@ -12,6 +12,16 @@ struct MortonPoint {
     uint32_t column = 0, row = 0;
 };
 
+// The bits at even places of a number, side by side; one or sixteen.
+template <typename UInt>
+constexpr UInt even_bits(UInt bits) {
+    bits = bits & 0x55555555u;
+    bits = (bits | bits >> 1) & 0x33333333u;
+    bits = (bits | bits >> 2) & 0x0f0f0f0fu;
+    bits = (bits | bits >> 4) & 0x00ff00ffu;
+    return (bits | bits >> 8) & 0x0000ffffu;
+}
+
 // Of coordinates below 2^16, one each or sixteen.
 template <typename UInt>
 UInt morton_code(const UInt &column, const UInt &row) {

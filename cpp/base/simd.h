@@ -1,5 +1,5 @@
-// The vocabulary of vector code: the only place, but for morton.h, that knows Dr.Jit, and
-// the only one that knows the width of a register.
+// The vocabulary of vector code. Only this folder knows Dr.Jit and the width of a register;
+// this file is the core of it.
 //
 // A packet is 16 lanes on every processor; narrower instruction sets run it in two or four
 // parts. Arithmetic is plain IEEE: the same operations in the same order give the same bits
@@ -42,7 +42,6 @@ inline constexpr uint32_t WIDE_WIDTH = 16;
 inline constexpr uint32_t WIDE_WIDTH = BLOCK_WIDTH;
 #endif
 using FloatWide = drjit::Packet<float, WIDE_WIDTH>;
-using DoubleWide = drjit::Packet<double, WIDE_WIDTH>;
 using IntWide = drjit::Packet<int32_t, WIDE_WIDTH>;
 using UIntWide = drjit::Packet<uint32_t, WIDE_WIDTH>;
 

@@ -77,6 +77,13 @@ constexpr T max_component(Vec3<T> a) {
     return std::max(a.x, std::max(a.y, a.z));
 }
 
+// The number of the component that is the largest in magnitude, the first of equals.
+template <typename T>
+constexpr int largest_axis(Vec3<T> a) {
+    const Vec3<T> size = abs(a);
+    return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+}
+
 template <typename T>
 T length(Vec3<T> a) {
     using std::sqrt; // packets bring their own

@@ -10,6 +10,15 @@ namespace mlrt {
 
 using LongPacket = drjit::Packet<uint64_t, PACKET_WIDTH>;
 
+template <int BITS>
+UIntPacket shifted_left(const UIntPacket &a) {
+    return drjit::sl<BITS>(a);
+}
+template <int BITS>
+UIntPacket shifted_right(const UIntPacket &a) {
+    return drjit::sr<BITS>(a);
+}
+
 // By counts below 32.
 inline UIntPacket rotate_right(const UIntPacket &a, const UIntPacket &counts) {
 #if defined(__AVX512F__)

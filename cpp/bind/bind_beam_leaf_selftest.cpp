@@ -141,7 +141,7 @@ nb::dict describe(const BeamUnderTest &self) {
         one["first_ray"] = beam.lanes[n].first_ray;
         one["reciprocal_depths"] =
             std::array{run.least[n % PACKET_WIDTH], run.greatest[n % PACKET_WIDTH]};
-        const RayBounds &all = run.all;
+        const PacketBounds &all = run.all;
         one["box_of_run"] = std::array{all.center_p, all.center_q, all.half_p, all.half_q};
         if (beam.parallel) {
             const LaneArray<float> u = to_lanes<float>(packet.u),

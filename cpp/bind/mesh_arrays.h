@@ -4,6 +4,7 @@
 #include "base/huge_array.h"
 #include "geometry/triangle.h"
 #include "kdtree/chunks.h"
+#include "kdtree/events.h"
 
 #include <nanobind/ndarray.h>
 #include <stdexcept>
@@ -19,8 +20,8 @@ using Faces = nanobind::ndarray<const uint32_t, nanobind::shape<-1, 3>, nanobind
 // Raises ValueError or IndexError for what makes no mesh. Without the interpreter's lock.
 inline HugeArray<Triangle> triangles_of(const Points &vertices, const Faces &faces) {
     const size_t vertex_count = vertices.shape(0), face_count = faces.shape(0);
-    if (face_count > 0x7fffffffu)
-        throw std::invalid_argument("a tree holds at most 2^31 - 1 faces");
+    if (face_count > Event::MAX_REFERENCES)
+        throw std::invalid_argument("a tree holds at most 2^30 faces");
     const nanobind::gil_scoped_release release;
     HugeArray<Triangle> triangles(face_count);
     for_each_chunk(face_count, all_threads(), [&](uint32_t, uint64_t first, uint64_t last) {

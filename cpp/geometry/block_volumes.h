@@ -90,8 +90,8 @@ public:
         const Real slack = fused(error * absolute(reciprocal), (hi - lo) * 8.5f,
                                  fused(depth_, Real(24 * FLOAT_ROUNDOFF), Real(UNDERFLOW)));
         // Where nothing is known of the depth it is not a number: the vertices remain.
-        seen.nearest = maximum(depth - slack, lo) * (1 - WIDEN_DEPTH);
-        seen.farthest = minimum(depth + slack, hi) * (1 + WIDEN_DEPTH);
+        seen.nearest = maximum(depth - slack, lo) * (1 - WIDEN_COMPUTED_DEPTH);
+        seen.farthest = minimum(depth + slack, hi) * (1 + WIDEN_COMPUTED_DEPTH);
         return seen;
     }
 
@@ -100,7 +100,7 @@ private:
     // Much more than what underflow may take.
     static constexpr float UNDERFLOW = 0x1p-120f;
     // Of vertices and of distances to float, and those of what follows.
-    static constexpr float WIDEN_DEPTH = 12 * FLOAT_ROUNDOFF;
+    static constexpr float WIDEN_COMPUTED_DEPTH = 12 * FLOAT_ROUNDOFF;
 
     static Vec3<Real>
     relative(const std::array<std::array<float, BLOCK_WIDTH>, 9> &coordinates, size_t first,

@@ -27,16 +27,14 @@ namespace {
 //
 // Rounding, u = 2^-53:
 // * t: two differences and a quotient, each within a relative u of positive numbers, and
-// one
-//   product; the factor 1 + 8u makes the result an upper bound. The least normal number,
-//   added for the sake of quotients that underflow, changes no other.
-// * new q_j = q_a + t (q_b - q_a): with M = max(|q_a|, |q_b|) the difference is at most 2M
-// and
-//   difference and product err by (2u + u^2) t |q_b - q_a| <= 4.1 u M, the sum by u (1 +
-//   8u) M: 5.2 u M in all, on top of the convex combination of the errors of a and b, which
-//   is at most the larger one. 8 u M leaves 2.8 u M for the rounding of q + error where it
-//   is used (u M). Where q_a = q_b the new coordinate is exact: triangles parallel to a
-//   face of the cell stay so to the bit.
+//   one product; the factor 1 + 8u makes the result an upper bound. The least normal
+//   number, added for the sake of quotients that underflow, changes no other.
+// * new q_j = q_a + t (q_b - q_a): with M = max(|q_a|, |q_b|) the difference is at most
+//   2M, and difference and product err by (2u + u^2) t |q_b - q_a| <= 4.1 u M, the sum by
+//   u (1 + 8u) M: 5.2 u M in all, on top of the convex combination of the errors of a and
+//   b, which is at most the larger one. 8 u M leaves 2.8 u M for the rounding of q + error
+//   where it is used (u M). Where q_a = q_b the new coordinate is exact: triangles
+//   parallel to a face of the cell stay so to the bit.
 constexpr double UNIT = 0x1p-53;
 constexpr double UNDERFLOW = std::numeric_limits<double>::min();
 

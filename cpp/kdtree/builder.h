@@ -23,8 +23,7 @@ struct BuildOptions {
     // K_T: one step through an inner node, and K_I: one triangle of a leaf, of which beams
     // and the wide tree take eight at a time. Chosen from 0.02 to 1.5 by the frames of
     // office, conference, sponza, building and dragon: less is faster with one ray a pixel,
-    // more with 16. Packets and single rays that walk this tree take
-    // less time with 1.5.
+    // more with 16. Packets and single rays that walk this tree take less time with 1.5.
     float traversal_cost = 1.0f;
     float intersection_cost = 0.25f;
     float empty_bonus = 0.8f; // factor on the cost of a split that cuts off empty space

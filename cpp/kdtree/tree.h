@@ -7,6 +7,7 @@
 #include "kdtree/node.h"
 #include "kdtree/widening.h"
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -14,6 +15,12 @@
 namespace mlrt {
 
 class LazyGrowth;
+
+// Not the one of any tree before, in this process.
+inline uint64_t next_tree_identity() {
+    static std::atomic<uint64_t> last{0};
+    return ++last;
+}
 
 // A tree over triangles. Node 0 is the root and its cell is `bounds`; a cell is closed, so
 // children share their split plane.
@@ -29,6 +36,10 @@ struct KdTree {
     HugeArray<uint32_t> references; // numbers of triangles, leaf by leaf
     HugeArray<Triangle> triangles;  // every face that was given, in its order
     int depth = 0;                  // inner nodes on the longest path from the root
+
+    // What is remembered of a tree is looked up by it: other trees may come to lie where
+    // this one did.
+    uint64_t identity = next_tree_identity();
 
     // What is not built yet; none if all is. Nodes and references that are added lie in
     // the arrays' capacity.

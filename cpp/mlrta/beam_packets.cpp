@@ -34,8 +34,7 @@ std::optional<uint32_t> BeamPackets::choose_axis(const RayGroup &rays, uint32_t 
 }
 
 void BeamPackets::set_axes(Vec3f d) {
-    const Vec3f size = abs(d);
-    const int k = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const int k = largest_axis(d);
     axes = {(k + 1) % 3, (k + 2) % 3, k};
     side = d[k] > 0 ? 1.0f : -1.0f;
 }
@@ -84,7 +83,7 @@ void BeamPackets::set_axes(Vec3f d) {
             maximum(select(active, greatest, Lanes(0.0f)), farthest.greatest);
         const Lanes begin =
             maximum(t_min, Lanes(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
-            SMALLEST_DEPTH;
+            LEAST_DEPTH;
         farthest.begin = maximum(select(active, begin, Lanes(0.0f)), farthest.begin);
     });
 }

@@ -17,7 +17,7 @@
 #include "mlrta/beam.h"
 #include "mlrta/packet_set.h"
 #include "mlrta/range.h"
-#include "traverse/parameter_interval.h"
+#include "traverse/hit_depth.h"
 #include "traverse/ray_group.h"
 
 #include <array>
@@ -61,7 +61,7 @@ struct BeamPacket {
 
 // Of some rays of a beam, a rectangle parallel to that of the beam and relative to its
 // center, and the smallest `least`, infinite if none is active.
-struct RayBounds {
+struct PacketBounds {
     float center_p, center_q, half_p, half_q;
     float least;
 };
@@ -99,12 +99,12 @@ struct BeamPackets {
     };
     std::array<Begin, CAPACITY> begins; // of parallel packets
 
-    // Bounds of sixteen packets side by side, as RayBounds has them, and of all sixteen;
+    // Bounds of sixteen packets side by side, as PacketBounds has them, and of all sixteen;
     // and a bound of `greatest` of each packet's active rays.
     struct Run {
         FloatPacket center_p, center_q, half_p, half_q;
         LaneArray<float> least, greatest;
-        RayBounds all;
+        PacketBounds all;
     };
     std::array<Run, RUNS> runs;
     // No packet's bounds are narrower.
@@ -184,18 +184,8 @@ private:
     // that others divide by must not be zero.
     static constexpr float LEAST_SLACK = 0x1p-120f;
 
-    // Of a depth t |d_k|: the rounding of a distance to float, that of the product, and
-    // those of what follows. Depths below SMALLEST_DEPTH may have lost digits to underflow.
-    static constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
-    static constexpr float SMALLEST_DEPTH = 0x1p-120f;
-
     // Ends of rays below it: what is lost to underflow is small beside what is above.
     static constexpr float SMALLEST_END = 0x1p-60f;
-
-    // Distances below it may be denormal once they are rounded, and then equal where depths
-    // differ: of none of them it is certain which one is nearer. Chosen so large that none
-    // of its products is denormal, which takes processors a hundred cycles.
-    static constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 
     static FloatPacket masked(LaneBits lanes, const FloatPacket &values, float other) {
         return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));

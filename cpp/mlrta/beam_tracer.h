@@ -29,8 +29,8 @@ public:
         : tree_(tree), rays_(rays), options_(options), camera_(camera), output_(output),
           counters_(counters), memory_(memory),
           packets_(tree, rays, options, output, counters), beam_(memory.beam),
-          regroupings_(regroupings), patience_(patience_of_thread<BeamTracer>(&tree)),
-          triangles_per_ray_(kept_by_thread<BeamTracer, TrianglesPerRay>(&tree).mean) {}
+          regroupings_(regroupings), patience_(patience_of_thread<BeamTracer>(tree)),
+          triangles_per_ray_(kept_by_thread<BeamTracer, TrianglesPerRay>(tree).mean) {}
 
     // Traces a run of rays.
     void trace(uint32_t first, uint32_t count, const Frontier &frontier) {
@@ -83,7 +83,7 @@ private:
     // Returns false if it was not tried, or given up, and has left nothing then.
     bool trace_huge_beam(uint32_t first, uint32_t count, const Frontier &frontier) {
         struct HugeBeams {};
-        Patience &patience = patience_of_thread<HugeBeams>(&tree_);
+        Patience &patience = patience_of_thread<HugeBeams>(tree_);
         if ((packets_.knows_wide_tree() && patience_.spares()) || patience.spares_next())
             return false;
         const uint64_t before = counters_.beam_triangles;

@@ -1,5 +1,6 @@
 // Beams of a camera's rays: bounds come from the film, and rays are not looked at before
 // that is needed. Where one triangle covers a packet they never are.
+#include "base/morton.h"
 #include "mlrta/beam_packets.h"
 #include "mlrta/film_slopes.h"
 
@@ -20,15 +21,6 @@ constexpr double ROUNDED_UP = 1 + 8 * ROUNDOFF;
 
 // Slopes may not be so small wherever rays go, unless all are zero; see SMALLEST_SLOPE.
 constexpr double SMALLEST_ERROR = 0x1p-99;
-
-// The bits at even places, side by side.
-UIntPacket even_bits(UIntPacket bits) {
-    bits = bits & 0x55555555u;
-    bits = (bits | bits >> 1) & 0x33333333u;
-    bits = (bits | bits >> 2) & 0x0f0f0f0fu;
-    bits = (bits | bits >> 4) & 0x00ff00ffu;
-    return (bits | bits >> 8) & 0x0000ffffu;
-}
 
 } // namespace
 
@@ -160,7 +152,7 @@ void BeamPackets::set_middles(const CameraTile &tile, uint32_t first_of_run,
 // As load_packet() does, but for all rays at once.
 void BeamPackets::set_camera_ends(float t_min, float t_max, const Range &main) {
     const double begin = std::max({double(t_min), 0.0, double(SMALLEST_DISTANCE)});
-    nearest = float((1 - 2 * WIDEN_DEPTH) / (begin * main.hi + SMALLEST_DEPTH));
+    nearest = float((1 - 2 * WIDEN_DEPTH) / (begin * main.hi + LEAST_DEPTH));
     float least = 0, greatest = INFINITE;
     if (t_max >= SMALLEST_END && t_max * main.lo >= SMALLEST_END) {
         least = float((1 - 2 * WIDEN_DEPTH) / (t_max * main.hi));

@@ -66,7 +66,7 @@ public:
     // distances to all planes across the cell are finite, with a margin.
     bool says_something(const BoxPacket &inside) const {
         return (axes_[0].heading != 0 || axes_[1].heading != 0 || axes_[2].heading != 0) &&
-               drjit::all(absolute(inside) < BoxPacket(0x1p126f));
+               !any_lane(~(absolute(inside) < BoxPacket(0x1p126f)));
     }
 
     // Faces of a child of a cell that is split.
@@ -75,7 +75,7 @@ public:
         const float of_plane =
             upper ? axis.last_origin - plane.position : plane.position - axis.first_origin;
         const BoxLanes lane(plane.axis + (upper ? 0 : 4));
-        return select(MaskOf<BoxPacket>(drjit::arange<BoxLanes>() == lane),
+        return select(MaskOf<BoxPacket>(lane_numbers<BoxLanes>() == lane),
                       BoxPacket(of_plane), inside);
     }
 

@@ -1,21 +1,24 @@
-// What a thread learned from the tiles of a scene for those to come: neighbouring tiles are
+// What a thread learned from the tiles of a tree for those to come: neighbouring tiles are
 // mostly traced by the same thread.
 #pragma once
 
+#include "kdtree/tree.h"
+
+#include <cstdint>
+
 namespace mlrt {
 
-// A Value of this thread for one Kind of use and one scene, new for another scene. One that
-// takes the place of another in memory begins with what was kept of that: it must not
-// matter to hits.
+// A Value of this thread for one Kind of use and one tree, new for another tree. It must
+// not matter to hits.
 template <typename Kind, typename Value>
-Value &kept_by_thread(const void *scene) {
+Value &kept_by_thread(const KdTree &tree) {
     struct Kept {
-        const void *scene = nullptr;
+        uint64_t identity = 0; // of no tree
         Value value;
     };
     thread_local Kept kept;
-    if (kept.scene != scene)
-        kept = {scene, {}};
+    if (kept.identity != tree.identity)
+        kept = {tree.identity, {}};
     return kept.value;
 }
 

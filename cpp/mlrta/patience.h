@@ -37,12 +37,10 @@ private:
     uint32_t left_ = 0;   // of those after the last one
 };
 
-// That of this thread, for one kind of beams in one scene: neighbouring tiles are mostly
-// traced by the same thread. A scene that takes the place of another in memory begins with
-// its patience, which costs some time at most.
+// That of this thread, for one kind of beams in one tree.
 template <typename Kind>
-Patience &patience_of_thread(const void *scene) {
-    return kept_by_thread<Kind, Patience>(scene);
+Patience &patience_of_thread(const KdTree &tree) {
+    return kept_by_thread<Kind, Patience>(tree);
 }
 
 } // namespace mlrt

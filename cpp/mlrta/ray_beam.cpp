@@ -102,9 +102,8 @@ using Lanes = FloatWide;
 // would do, though bounds are narrower along this one.
 int main_axis(const RayGroup &rays, uint32_t first, uint32_t count) {
     const uint32_t middle = first + count / 2;
-    const Vec3f size = abs(Vec3f{rays.direction[0][middle], rays.direction[1][middle],
-                                 rays.direction[2][middle]});
-    return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    return largest_axis(Vec3f{rays.direction[0][middle], rays.direction[1][middle],
+                              rays.direction[2][middle]});
 }
 
 RayBounds bounds_of(const RayGroup &rays, uint32_t first, uint32_t count, int axis) {

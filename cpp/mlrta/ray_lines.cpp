@@ -157,6 +157,8 @@ ImageTile RayLines::tile(uint32_t number) const {
     ImageTile tile;
     tile.packet_width_ = width;
     tile.packets_along_ = uint32_t(tile_width_ / width);
+    tile.packet_rows_ = uint32_t(tile_height_ / height);
+    MLRT_CHECK(tile.packet_rows_ * tile.packets_along_ <= ImageTile::MOST_PACKETS);
     tile.first_ = uint32_t(top * length_ + left - lacking_);
     tile.line_step_ = uint32_t(length_);
     const size_t right = std::min(left + tile_width_, length_);

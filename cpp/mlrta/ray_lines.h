@@ -82,7 +82,7 @@ private:
     template <uint32_t WIDTH, typename Visit>
     void for_each_quarter_of(Visit &&visit) const {
         constexpr uint32_t HEIGHT = PACKET_WIDTH / WIDTH;
-        for (uint32_t row = 0; row * packets_along_ < MOST_PACKETS; ++row) {
+        for (uint32_t row = 0; row < packet_rows_; ++row) {
             const uint32_t *begin = &packets_[row * packets_along_];
             const uint32_t *end = begin + packets_along_;
             uint32_t first = first_ + row * HEIGHT * line_step_;
@@ -113,7 +113,8 @@ private:
     // Which packet of the tile it is, or NONE, row by row. Those that there are in a row
     // stand side by side.
     std::array<uint32_t, MOST_PACKETS> packets_;
-    uint32_t packet_width_ = 0, packets_along_ = 0; // in rays of a line, and in packets
+    uint32_t packet_width_ = 0; // in rays of a line
+    uint32_t packets_along_ = 0, packet_rows_ = 0;
 
     // The ray in the upper left corner and how many there are to the one below it, modulo
     // 2^32: there need be no such ray.

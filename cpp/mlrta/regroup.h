@@ -28,7 +28,7 @@ struct RayNumbers {
 class Occupancy {
 public:
     static constexpr int SIDE = 8;
-    // Beams of more rays, which only cameras make, are not regrouped.
+    // Larger beams are not regrouped.
     static constexpr uint32_t MOST_RAYS = 1024;
 
     // Of a beam of up to MOST_RAYS rays.

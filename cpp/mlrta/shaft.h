@@ -13,7 +13,7 @@ namespace mlrt {
 class Shaft {
 public:
     // Neither box is empty, and their coordinates and those of what is asked about are at
-    // most `reach` in size, 2^125 at most.
+    // most `reach` in size, 2^126 at most.
     Shaft(const Box3f &begin, const Box3f &end, float reach);
 
     const Box3f &bounds() const { return bounds_; }

@@ -39,7 +39,7 @@ float reach_of(const Box3f &box) {
 
 ShaftTracer::ShaftTracer(const KdTree &tree, const RayGroup &rays, Counters &counters)
     : tree_(tree), rays_(rays), counters_(counters),
-      patience_(patience_of_thread<ShaftTracer>(&tree)) {}
+      patience_(patience_of_thread<ShaftTracer>(tree)) {}
 
 std::vector<uint32_t> ShaftTracer::trace(uint8_t *occluded) {
     occluded_ = occluded;

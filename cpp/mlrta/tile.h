@@ -15,9 +15,9 @@ struct Tile {
     uint32_t first, count;
 };
 
-// Calls visit(child) for each part of a tile, in order: split_factor equal runs, of packets
-// by a power of four so that squares stay whole, or fewer where the last ones would be
-// empty. A tile of one packet has one part, itself.
+// Calls visit(child) for each part of a tile, in order: at most split_factor runs, all but
+// the last of as many packets, a power of four so that squares stay whole. A tile of one
+// packet has one part, itself.
 template <typename Visit>
 void for_each_child(Tile tile, uint32_t split_factor, Visit &&visit) {
     const uint32_t share = (tile.count + split_factor - 1) / split_factor;

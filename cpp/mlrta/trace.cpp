@@ -61,7 +61,7 @@ private:
         if constexpr (Output::query == Query::any) {
             // Neighbouring tiles are often covered by the same triangle.
             const uint32_t last = last_blocker();
-            if (has_beams() && last < tree_.triangles.size())
+            if (has_beams(options_.traversal) && last != NO_PRIMITIVE)
                 judge.try_blocker(last);
             if (stopped_by_blocker(first, count, judge)) {
                 cost.add_to_run(first, count);
@@ -90,16 +90,10 @@ private:
         });
     }
 
-    // Traversals of the paper trace all rays of a tile that its search does not miss.
-    bool has_beams() const {
-        return options_.traversal == Traversal::adaptive ||
-               options_.traversal == Traversal::beam_leaf;
-    }
-
     // Whether a triangle stops all rays of the tile, of Query::any: it answers them then.
     bool stopped_by_blocker(uint32_t first, uint32_t count, const BeamJudge &judge) {
         if constexpr (Output::query == Query::any) {
-            if (!has_beams() || !judge.found_blocker() ||
+            if (!has_beams(options_.traversal) || !judge.found_blocker() ||
                 !(judge.t_max() <= first_end(first, count)))
                 return false;
             last_blocker() = judge.blocker();
@@ -131,13 +125,12 @@ private:
                                         : active(load_packet<LaneOrigins>(rays_, first)));
     }
 
-    // The last triangle that stopped all rays of a tile; of another scene if that had its
-    // place in memory before.
+    // The last triangle that stopped all rays of a tile.
     struct LastBlocker {
         uint32_t primitive = NO_PRIMITIVE;
     };
     uint32_t &last_blocker() const {
-        return kept_by_thread<LastBlocker, LastBlocker>(&tree_).primitive;
+        return kept_by_thread<LastBlocker, LastBlocker>(tree_).primitive;
     }
 
     const KdTree &tree_;
@@ -181,8 +174,7 @@ void trace_group(const KdTree &tree, const RayGroup &rays, const TraceOptions &a
             .trace();
     };
     output.clear(rays.count);
-    const bool beams = options.traversal == Traversal::beam_leaf ||
-                       options.traversal == Traversal::adaptive;
+    const bool beams = has_beams(options.traversal);
     if (!rays.has_common_origin) {
         if constexpr (Output::query == Query::any)
             if (beams && are_parallel(rays)) {

@@ -28,6 +28,12 @@ enum class Traversal : uint32_t {
               // made, else X1 or X2, whichever pays
 };
 
+// Whether beams are tried; packets of the paper alone trace all rays of a tile that its
+// search does not miss.
+constexpr bool has_beams(Traversal traversal) {
+    return traversal == Traversal::beam_leaf || traversal == Traversal::adaptive;
+}
+
 // Step 2 of inverse frustum culling, at leaves [C2].
 enum class LeafRejection : uint32_t {
     none,

@@ -16,13 +16,8 @@ namespace mlrt {
 
 namespace {
 
-bool has_beams(const TraceOptions &options) {
-    return options.traversal == Traversal::beam_leaf ||
-           options.traversal == Traversal::adaptive;
-}
-
 bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
-    return !rays.cost && rays.count <= RayOrder::MOST_RAYS && has_beams(options);
+    return !rays.cost && rays.count <= RayOrder::MOST_RAYS && has_beams(options.traversal);
 }
 
 // The options for rays that go apart, if these are such and the wide tree is there: it
@@ -30,7 +25,7 @@ bool may_be_regrouped(const RayGroup &rays, const TraceOptions &options) {
 // for entry points, shafts and packets.
 std::optional<TraceOptions> options_apart(const KdTree &tree, const RayGroup &rays,
                                           const TraceOptions &options) {
-    if (rays.has_common_origin || rays.cost || !has_beams(options) ||
+    if (rays.has_common_origin || rays.cost || !has_beams(options.traversal) ||
         !wide_tree_for(tree, options) || !go_apart(rays))
         return std::nullopt;
     TraceOptions apart = options;
@@ -96,7 +91,8 @@ uint32_t unordered_group_size(const TraceOptions &options, uint64_t rays) {
 }
 
 bool squares_pay(const TraceOptions &options, uint32_t rays) {
-    return has_beams(options) && options.initial_tile * options.initial_tile <= rays;
+    return has_beams(options.traversal) &&
+           options.initial_tile * options.initial_tile <= rays;
 }
 
 void trace_closest_unordered(const KdTree &tree, const RayGroup &rays,

@@ -224,7 +224,7 @@ LaneBits TriangleForms::possible_covers(const BeamPackets &beam) const {
 }
 
 template <typename Real>
-LaneBits TriangleForms::block_for(const RayBounds &bounds) const {
+LaneBits TriangleForms::block_for(const PacketBounds &bounds) const {
     return to_bits(may_hit(bounds, Real(bounds.least),
                            [](const Lanes &lanes) { return load<Real>(lanes); }));
 }

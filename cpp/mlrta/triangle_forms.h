@@ -95,7 +95,7 @@ private:
     template <typename Real, typename Bounds, typename ValueOf>
     MaskOf<Real> may_hit(const Bounds &bounds, const Real &least, ValueOf &&value_of) const;
     template <typename Real>
-    LaneBits block_for(const RayBounds &bounds) const;
+    LaneBits block_for(const PacketBounds &bounds) const;
     template <typename Real>
     void set_block(const BeamPackets &beam, float least, const Triangle *triangles,
                    const uint32_t *numbers, uint32_t count);

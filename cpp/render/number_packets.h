@@ -16,7 +16,7 @@ namespace mlrt {
 [[gnu::always_inline]] inline void mix_words(UIntPacket &v0, UIntPacket &v1) {
     const auto mixed = [](const UIntPacket &v, uint32_t left, uint32_t sum,
                           uint32_t right) {
-        return (drjit::sl<4>(v) + left) ^ (v + sum) ^ (drjit::sr<5>(v) + right);
+        return (shifted_left<4>(v) + left) ^ (v + sum) ^ (shifted_right<5>(v) + right);
     };
     uint32_t sum = 0;
     for (int round = 0; round < 4; ++round) {
@@ -40,8 +40,8 @@ public:
         const UIntPacket high = high_words(state_), low = low_words(state_);
         // The lower half of ((state >> 18) ^ state) >> 27.
         const UIntPacket bits =
-            (drjit::sl<5>(high) | drjit::sr<27>(low)) ^ drjit::sr<13>(high);
-        return unit_floats(rotate_right(bits, drjit::sr<27>(high)));
+            (shifted_left<5>(high) | shifted_right<27>(low)) ^ shifted_right<13>(high);
+        return unit_floats(rotate_right(bits, shifted_right<27>(high)));
     }
 
 private:

@@ -4,15 +4,12 @@
 #include "base/partial_packets.h"
 #include "geometry/block_volumes.h"
 #include "geometry/packet_distances.h"
-#include "geometry/triangle_test.h"
-#include "traverse/parameter_interval.h"
 #include "traverse/wide_scene.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 #include <utility>
 
@@ -82,8 +79,8 @@ public:
             to_bits(load<UIntBlock>(block.numbers.data()) != UIntBlock(NO_PRIMITIVE));
         counters.triangle_tests += uint64_t(std::popcount(there));
         candidates_ = seen.possible & there &
-                      ~to_bits((seen.nearest > FloatBlock(ray_.best_to)) |
-                               (seen.farthest < FloatBlock(0.0f)));
+                      ~to_bits((seen.nearest > FloatBlock(ray_.best.to)) |
+                               (seen.farthest < FloatBlock(ray_.before)));
         certain_ = seen.certain;
         store(nearest_.data(), seen.nearest);
         store(farthest_.data(), seen.farthest);
@@ -93,27 +90,28 @@ public:
 
     void test_candidates(const WideScene &scene, const WideRays &rays, Counters &counters) {
         const WideBlock &block = scene.blocks[next_.index()];
-        const float to = ray_.best_to;
+        const float to = ray_.best.to;
         for_each_lane(candidates_, [&](uint32_t lane) {
             const uint32_t primitive = block.numbers[lane];
             // Of large triangles many blocks have a copy.
-            if (primitive == ray_.best || nearest_[lane] > ray_.best_to)
+            if (primitive == ray_.best.primitive || nearest_[lane] > ray_.best.to)
                 return;
             const bool certain = certain_ >> lane & 1;
-            if (certain && nearest_[lane] > ray_.begin && farthest_[lane] < ray_.best_from)
-                set_best(primitive, WideRay::UNKNOWN, nearest_[lane], farthest_[lane]);
+            if (certain && nearest_[lane] > ray_.begin && farthest_[lane] < ray_.best.from)
+                ray_.best = {primitive, UNKNOWN_DISTANCE, nearest_[lane],
+                             QUERY == Query::any ? -INFINITE : farthest_[lane]};
             else
                 decide(block.triangle(lane), primitive, certain, scene.triangles, rays,
                        counters);
         });
-        if (ray_.best_to != to)
+        if (ray_.best.to != to)
             shorten();
         go_on(scene, pending_);
     }
 
     // What was found, without its distance.
     uint32_t number() const { return ray_.number; }
-    uint32_t primitive() const { return ray_.best; }
+    uint32_t primitive() const { return ray_.best.primitive; }
 
 private:
     // To what is on top of the stack, whose memory it asks for.
@@ -130,7 +128,7 @@ private:
             return;
         }
         // WIDEN_FAR covers the roundings of a reciprocal and of three products.
-        ray_.search_end = ray_.best_to * ray_.per_size * WIDEN_FAR + 2 * TINY_PARAMETER;
+        ray_.search_end = ray_.best.to * ray_.per_size * WIDEN_FAR + 2 * TINY_PARAMETER;
         uint32_t kept = 1;
         for (uint32_t i = 1; i < pending_; i += BLOCK_WIDTH) {
             const auto near = load<FloatBlock>(&nears_[i]);
@@ -144,56 +142,19 @@ private:
         pending_ = kept;
     }
 
-    // By the contract of triangle_test.h: makes it the best hit, if it is.
     void decide(const Triangle &triangle, uint32_t primitive, bool certainly_hit,
                 const Triangle *triangles, const WideRays &rays, Counters &counters) {
-        const uint32_t rival = ray_.best, number = ray_.number;
-        // Of an equal triangle all is known.
-        if (rival != NO_PRIMITIVE &&
-            std::memcmp(&triangle, &triangles[rival], sizeof(Triangle)) == 0) {
-            ray_.best = std::min(primitive, rival);
-            return;
-        }
-        const Vec3f o{ray_.origin[0], ray_.origin[1], ray_.origin[2]};
-        const Vec3f d{rays.direction[0][number], rays.direction[1][number],
-                      rays.direction[2][number]};
-        if (!certainly_hit) {
-            const HitDecision decision = decide_hit(o, d, triangle);
-            ++counters.double_tests;
-            counters.exact_tests += decision.precision == Precision::exact;
-            if (!decision.hit)
-                return;
-        }
-        const float t = hit_distance(o, d, triangle);
-        if (!(t > rays.t_min[number] && t < INFINITE))
-            return;
-        if (rival == NO_PRIMITIVE) {
-            if (t > rays.t_max[number])
-                return;
-        } else {
-            float &best = ray_.best_distance;
-            if (best == WideRay::UNKNOWN)
-                best = hit_distance(o, d, triangles[rival]);
-            if (t > best || (t == best && primitive > rival))
-                return;
-        }
-        // In double, where a denormal distance is as far off as others.
-        const double size = ray_.size, least = double(SMALLEST_FLOAT);
-        set_best(primitive, t,
-                 float((t - least) * size * (1 - 0x1p-21)) - WideRay::LEAST_DEPTH,
-                 float((t + least) * size * (1 + 0x1p-21)) + WideRay::LEAST_DEPTH);
-    }
-
-    // The distance may be left open; its depth lies between the given ones.
-    void set_best(uint32_t primitive, float distance, float from, float to) {
-        ray_.best = primitive;
-        if constexpr (QUERY == Query::any) {
-            ray_.best_to = -INFINITE; // nothing is of interest any more
-        } else {
-            ray_.best_distance = distance;
-            ray_.best_from = from;
-            ray_.best_to = to;
-        }
+        const uint32_t number = ray_.number;
+        const DepthRay ray{{ray_.origin[0], ray_.origin[1], ray_.origin[2]},
+                           {rays.direction[0][number], rays.direction[1][number],
+                            rays.direction[2][number]},
+                           rays.t_min[number],
+                           rays.t_max[number],
+                           ray_.size};
+        const bool wins = decide_best(ray, triangle, primitive, certainly_hit, triangles,
+                                      ray_.best, counters);
+        if (QUERY == Query::any && wins)
+            ray_.best.to = -INFINITE; // nothing is of interest any more
     }
 
     WideRay ray_;

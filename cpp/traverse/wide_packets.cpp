@@ -3,9 +3,8 @@
 #include "base/block_order.h"
 #include "base/block_pair.h"
 #include "geometry/block_volumes.h"
-#include "geometry/triangle_test.h"
+#include "traverse/hit_depth.h"
 #include "traverse/packet_frustum.h"
-#include "traverse/parameter_interval.h"
 #include "traverse/wide_entry.h"
 #include "traverse/wide_scene.h"
 
@@ -14,23 +13,11 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 
 namespace mlrt {
 
 namespace {
-
-// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those
-// of what follows.
-constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
-// More than what underflow may take from a depth.
-constexpr float LEAST_DEPTH = 0x1p-120f;
-// Distances below it are looked at more closely, as in wide_rays.cpp.
-constexpr float SMALLEST_DISTANCE = 0x1p-60f;
-
-// Not the distance of any hit.
-constexpr float UNKNOWN = -1;
 
 template <Query QUERY>
 class PacketWalk;
@@ -63,12 +50,9 @@ public:
         searching_ = rays_->active;
         frustum_ = PacketFrustum(*rays_, packet.main_axis, packet.side);
         const FloatPacket size = absolute(rays_->direction[packet.main_axis]);
-        begin_ = to_lanes<float>(maximum(rays_->t_min, FloatPacket(SMALLEST_DISTANCE)) *
-                                     size * (1 + WIDEN_DEPTH) +
-                                 LEAST_DEPTH);
-        best_from_ = to_lanes<float>(rays_->t_max * size * (1 - WIDEN_DEPTH) - LEAST_DEPTH);
-        best_to_ = to_lanes<float>(
-            latest_distance(rays_->t_max) * size * (1 + WIDEN_DEPTH) + LEAST_DEPTH);
+        begin_ = to_lanes<float>(first_certain_depth(rays_->t_min, size));
+        best_from_ = to_lanes<float>(least_depth_of_end(rays_->t_max, size));
+        best_to_ = to_lanes<float>(greatest_depth_of_end(rays_->t_max, size));
         best_.fill(NO_PRIMITIVE);
         depth_ = 0;
         entered_ = searching_;
@@ -172,7 +156,7 @@ public:
                 return;
             const bool certain = candidates.certain >> lane & 1;
             if (certain && nearest > begin_[ray] && farthest < best_from_[ray])
-                set_best(ray, primitive, UNKNOWN, nearest, farthest);
+                set_best(ray, {primitive, UNKNOWN_DISTANCE, nearest, farthest});
             else
                 decide(ray, block.triangle(place), primitive, certain, scene.triangles,
                        counters);
@@ -186,55 +170,31 @@ public:
     }
 
 private:
-    // By the contract of triangle_test.h: makes it the best hit, if it is.
     void decide(uint32_t ray, const Triangle &triangle, uint32_t primitive,
                 bool certainly_hit, const Triangle *triangles, Counters &counters) {
-        const uint32_t rival = best_[ray];
-        // Of an equal triangle all is known.
-        if (rival != NO_PRIMITIVE &&
-            std::memcmp(&triangle, &triangles[rival], sizeof(Triangle)) == 0) {
-            best_[ray] = std::min(primitive, rival);
-            return;
-        }
-        const Vec3f o = rays_->origin.point, d = rays_->lane_direction(ray);
-        if (!certainly_hit) {
-            const HitDecision decision = decide_hit(o, d, triangle);
-            ++counters.double_tests;
-            counters.exact_tests += decision.precision == Precision::exact;
-            if (!decision.hit)
-                return;
-        }
-        const float t = hit_distance(o, d, triangle);
-        if (!(t > rays_->t_min.entry(ray) && t < INFINITE))
-            return;
-        if (rival == NO_PRIMITIVE) {
-            if (t > rays_->t_max.entry(ray))
-                return;
-        } else {
-            float &best = best_distance_[ray];
-            if (best == UNKNOWN)
-                best = hit_distance(o, d, triangles[rival]);
-            if (t > best || (t == best && primitive > rival))
-                return;
-        }
-        // In double, where a denormal distance is as far off as others.
-        const double size = std::abs(d[frustum_.axes[2]]), least = double(SMALLEST_FLOAT);
-        set_best(ray, primitive, t, float((t - least) * size * (1 - 0x1p-21)) - LEAST_DEPTH,
-                 float((t + least) * size * (1 + 0x1p-21)) + LEAST_DEPTH);
+        const Vec3f direction = rays_->lane_direction(ray);
+        const DepthRay depth_ray{rays_->origin.point, direction, rays_->t_min.entry(ray),
+                                 rays_->t_max.entry(ray),
+                                 std::abs(direction[frustum_.axes[2]])};
+        DepthHit best{best_[ray], best_distance_[ray], best_from_[ray], best_to_[ray]};
+        if (decide_best(depth_ray, triangle, primitive, certainly_hit, triangles, best,
+                        counters))
+            set_best(ray, best);
+        else
+            best_distance_[ray] = best.distance; // may have been found
     }
 
-    // The distance may be left open; its depth lies between the given ones.
-    void set_best(uint32_t ray, uint32_t primitive, float distance, float from, float to) {
-        best_[ray] = primitive;
+    void set_best(uint32_t ray, const DepthHit &hit) {
+        best_[ray] = hit.primitive;
         if constexpr (QUERY == Query::any) {
             best_to_[ray] = -INFINITE; // nothing is of interest any more
             searching_ &= ~(1u << ray);
             if (searching_ == 0)
                 depth_ = 0;
         } else {
-            best_distance_[ray] = distance;
-            best_from_[ray] = from;
-            best_to_[ray] = to;
+            best_distance_[ray] = hit.distance;
+            best_from_[ray] = hit.from;
+            best_to_[ray] = hit.to;
         }
     }
 
@@ -249,8 +209,7 @@ private:
 
     const RayPacket<CommonOrigin> *rays_;
     PacketFrustum frustum_;
-    // Of each ray: the depth from which on hits count for certain; bounds of the depth of
-    // its best hit or, without one, of its end; and the distance of that hit.
+    // Of each ray: the depth from which on hits count for certain, and a DepthHit.
     LaneArray<float> begin_, best_from_, best_to_, best_distance_;
     LaneArray<uint32_t> best_;
     LaneBits searching_, entered_;
@@ -332,8 +291,7 @@ LaneBits WidePacket::choose_axis(LaneBits lanes) {
     for (int i = std::popcount(lanes) / 2; i > 0; --i)
         left &= left - 1;
     const Vec3f d = rays.lane_direction(uint32_t(std::countr_zero(left)));
-    const Vec3f size = abs(d);
-    main_axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    main_axis = largest_axis(d);
     side = d[main_axis] > 0 ? 1.0f : -1.0f;
     const FloatPacket along = rays.direction[main_axis] * side;
     MaskOf<FloatPacket> with = along > 0.0f;

@@ -3,7 +3,6 @@
 #include "base/partial_packets.h"
 #include "base/transpose.h"
 #include "kdtree/wide_tree.h"
-#include "traverse/parameter_interval.h"
 
 #include <bit>
 #include <cstddef>
@@ -12,14 +11,6 @@
 namespace mlrt {
 
 namespace {
-
-// Of a depth t |d_k|: the rounding of a distance to float, that of the product, and those
-// of what follows.
-constexpr float WIDEN_DEPTH = 8 * FLOAT_ROUNDOFF;
-// Distances below it are looked at more closely: they may be denormal, and then equal where
-// depths differ. Chosen so large that none of its products is denormal, which takes
-// processors a hundred cycles.
-constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 
 template <typename Value>
 Value pick(const MaskOf<FloatPacket> &mask, const Value &yes, const Value &no) {
@@ -113,18 +104,13 @@ void set_triangles(Columns &columns, const RayPacket<LaneOrigins> &rays) {
     columns.set(offsetof(WideRay, size), size);
     columns.set(offsetof(WideRay, per_size), 1.0f / size);
 
-    columns.set(offsetof(WideRay, begin),
-                maximum(rays.t_min, FloatPacket(SMALLEST_DISTANCE)) * size *
-                        (1 + WIDEN_DEPTH) +
-                    WideRay::LEAST_DEPTH);
-    columns.set(offsetof(WideRay, best_from),
-                rays.t_max * size * (1 - WIDEN_DEPTH) - WideRay::LEAST_DEPTH);
-    columns.set(offsetof(WideRay, best_to),
-                latest_distance(rays.t_max) * size * (1 + WIDEN_DEPTH) +
-                    WideRay::LEAST_DEPTH);
-    columns.set(offsetof(WideRay, best_distance), FloatPacket(WideRay::UNKNOWN));
-    columns.set(offsetof(WideRay, best), UIntPacket(NO_PRIMITIVE));
-    columns.set(offsetof(WideRay, unused), UIntPacket(0u));
+    columns.set(offsetof(WideRay, before), last_depth_before(rays.t_min, size));
+    columns.set(offsetof(WideRay, begin), first_certain_depth(rays.t_min, size));
+    constexpr size_t BEST = offsetof(WideRay, best);
+    columns.set(BEST + offsetof(DepthHit, primitive), UIntPacket(NO_PRIMITIVE));
+    columns.set(BEST + offsetof(DepthHit, distance), FloatPacket(UNKNOWN_DISTANCE));
+    columns.set(BEST + offsetof(DepthHit, from), least_depth_of_end(rays.t_max, size));
+    columns.set(BEST + offsetof(DepthHit, to), greatest_depth_of_end(rays.t_max, size));
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "geometry/ray_packet.h"
+#include "traverse/hit_depth.h"
 
 #include <array>
 #include <cstdint>
@@ -12,14 +13,8 @@ namespace mlrt {
 
 // What a ray is to boxes and to triangles, and what it has found.
 //
-// Triangles are seen along the axis k of the largest component of the direction d, as in
-// block_volumes.h: a depth is t |d_k|.
+// Triangles are seen along the axis k of the largest component of the direction d.
 struct alignas(CACHE_LINE) WideRay {
-    // Not the distance of any hit.
-    static constexpr float UNKNOWN = -1;
-    // More than what underflow may take from a depth.
-    static constexpr float LEAST_DEPTH = 0x1p-120f;
-
     // The faces of a box that a ray crosses first and last: as bytes into a WideNode.
     struct Faces {
         uint16_t first, last;
@@ -37,11 +32,9 @@ struct alignas(CACHE_LINE) WideRay {
     std::array<float, 3> ordered_origin; // by these axes
     std::array<float, 2> slopes;         // of the first two to |d_k|
     float side, size, per_size;          // sign of d_k, |d_k| and its reciprocal
-    // The depth from which on hits count for certain, bounds of the depth of the best hit
-    // or, without one, of the end, and the distance of that hit.
-    float begin, best_from, best_to, best_distance;
-    uint32_t best; // triangle
-    uint32_t unused;
+    // Depths up to which hits certainly do not count, and from which on they do.
+    float before, begin;
+    DepthHit best;
 };
 
 static_assert(sizeof(WideRay) == 2 * CACHE_LINE);

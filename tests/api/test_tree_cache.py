@@ -35,10 +35,8 @@ def test_the_second_render_takes_the_tree_of_the_first(
     scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cache = tmp_path / "new" / "cache"
-    # Kept, since what threads learned of a tree they take for true of the next one in its
-    # place, and count otherwise then.
-    prepared = [prepare(scene), prepare(scene, tree_cache=cache)]
-    plain, first = (each.render() for each in prepared)
+    plain = render(scene)
+    first = render(scene, tree_cache=cache)
     assert set(first.timings) == {"load", "find_tree", "build", "save_tree", "render"}
     (path,) = files(cache)
     written = path.read_bytes()
@@ -47,8 +45,7 @@ def test_the_second_render_takes_the_tree_of_the_first(
         raise AssertionError("nothing is to be built")
 
     monkeypatch.setattr(core, "KdTree", fail)
-    prepared.append(prepare(scene, tree_cache=str(cache)))
-    second = prepared[-1].render()
+    second = render(scene, tree_cache=str(cache))
     assert set(second.timings) == {"load", "load_tree", "render"}
     assert plain.image.tobytes() == first.image.tobytes() == second.image.tobytes()
     assert plain.counters == first.counters == second.counters

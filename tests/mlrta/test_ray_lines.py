@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
-from tracing import Options, build, closest, each_core, interval, occluded
+from tracing import Options, beam_steps, build, closest, each_core, occluded
 
 SEED = 20261129
 PACKETS: Options = {"traversal": "packet"}
@@ -65,7 +65,12 @@ LINES = {
     "5 samples a pixel": rows(image(70, 70, 5)),
     "16 samples a pixel": rows(image(50, 40, 16)),
     "100 samples a pixel": rows(image(40, 40, 100))[5:],
-    "many rays": rows(image(600, 500)),
+    "two squares a tile": rows(image(400, 400)),
+    "three squares a tile": rows(image(512, 384)),
+    "three squares a tile, odd sides": rows(image(251, 799)),
+    "three squares a tile, 4 samples a pixel": rows(image(240, 240, 4)),
+    "three squares a tile, 100 samples a pixel": rows(image(45, 45, 100)),
+    "four squares a tile": rows(image(600, 500)),
     "holes": with_holes(),
 }
 
@@ -183,18 +188,16 @@ def test_one_other_origin_counts(core: ModuleType) -> None:
         closest(tree, (changed, directions), ADAPTIVE).assert_same(expected)
 
 
-def beam_steps(tree: Any, directions: Directions) -> int:
-    counters: dict[str, int] = {}
-    rays = np.tile(ORIGIN, (len(directions), 1)), directions
-    tree.closest_hit(*rays, *interval(rays, 0, np.inf), ADAPTIVE, counters)
-    return counters["beam_steps"]
-
-
 @each_core
 def test_rays_that_only_seem_to_be_lines_are_sorted(core: ModuleType) -> None:
     rng = np.random.default_rng(SEED)
     tree = build(core, workloads.soup(rng, 3000, 0.1))
     fooled = FOOLED["partly shuffled"]
     assert core.mlrta_selftest.image_tiles(fooled) is not None
+
+    def steps(directions: Directions) -> int:
+        rays = np.tile(ORIGIN, (len(directions), 1)), directions
+        return beam_steps(tree, rays, ADAPTIVE)
+
     # Of an eighth of the rays, squares are no squares.
-    assert beam_steps(tree, fooled) < 2 * beam_steps(tree, rows(image(512, 512)))
+    assert steps(fooled) < 2 * steps(rows(image(512, 512)))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
-from tracing import Options, Rays, build, closest, each_core, interval, occluded
+from tracing import Options, Rays, beam_steps, build, closest, each_core, occluded
 
 SEED = 20261128
 PACKETS: Options = {"traversal": "packet"}
@@ -65,13 +65,6 @@ def test_hits_are_those_of_packets(core: ModuleType, order: Any) -> None:
     assert np.array_equal(occluded(tree, rays, ADAPTIVE, t_max=t_max), expected.face >= 0)
 
 
-def beam_steps(tree: Any, directions: npt.NDArray[np.float32], options: Options) -> int:
-    counters: dict[str, int] = {}
-    rays = rays_of(directions)
-    tree.closest_hit(*rays, *interval(rays, 0, np.inf), options, counters)
-    return counters["beam_steps"]
-
-
 @each_core
 def test_no_order_costs_much_more_than_the_best(core: ModuleType) -> None:
     rng = np.random.default_rng(SEED)
@@ -80,7 +73,7 @@ def test_no_order_costs_much_more_than_the_best(core: ModuleType) -> None:
     rows, columns = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
     blocks = np.lexsort((columns % 16, rows % 16, columns // 16, rows // 16))
     for options in (ADAPTIVE, SMALL_BEAMS):
-        best = beam_steps(tree, line_by_line()[blocks], options)
-        assert beam_steps(tree, line_by_line(), options) < 1.5 * best, SEED
+        best = beam_steps(tree, rays_of(line_by_line()[blocks]), options)
+        assert beam_steps(tree, rays_of(line_by_line()), options) < 1.5 * best, SEED
     # Each group of 4096 rays is sorted for itself, and has less than a quarter of them.
-    assert beam_steps(tree, shuffled(), SMALL_BEAMS) < 2.5 * best, SEED
+    assert beam_steps(tree, rays_of(shuffled()), SMALL_BEAMS) < 2.5 * best, SEED

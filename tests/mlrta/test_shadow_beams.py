@@ -10,6 +10,8 @@ import pytest
 import workloads
 from tracing import BRUTE_FORCE, build, each_core, occluded
 
+from mlrt_plugin.threads import thread_count
+
 SEED = 20_261_129
 SIDE = 64
 COUNT = SIDE * SIDE
@@ -80,6 +82,18 @@ def test_few_beams_are_enough_for_a_free_floor(core: ModuleType) -> None:
     counters = beams_of(build(core, scene), rays, "adaptive")
     assert 0 < counters["beams"] <= 2 * len(rays[0]) // COUNT
     assert counters["rays"] == len(rays[0])
+
+
+@each_core
+def test_nothing_is_remembered_of_a_tree_that_is_gone(core: ModuleType) -> None:
+    """New trees mostly lie where others did that are gone."""
+    free, covered = (lit_floor(np.random.default_rng(SEED), n, 4) for n in (2, 2000))
+    with thread_count(1):
+        first = beams_of(build(core, free[0]), free[1], "adaptive")
+        for _ in range(10):
+            for _ in range(3):
+                beams_of(build(core, covered[0]), covered[1], "adaptive")
+            assert beams_of(build(core, free[0]), free[1], "adaptive") == first
 
 
 @each_core

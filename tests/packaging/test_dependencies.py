@@ -13,6 +13,9 @@ import repository
 CPP_ORDER = ["base", "geometry", "kdtree", "traverse", "mlrta", "objects", "render", "bind"]
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
 
+# What only the vocabulary of vector code may name.
+VECTOR_CODE = re.compile(r"\bdrjit::|\b_mm\d*_|\b__m\d+")
+
 # Third party: the files that alone may include it, and do.
 ENTRIES = {
     "drjit/": ["base/simd.h", "base/morton.h"],
@@ -36,6 +39,8 @@ def include_faults(file: str, text: str) -> list[str]:
                 faults.append(f"{file} includes {target}")
         if target.startswith(("nanobind/", "Python.h")) and folder != "bind":
             faults.append(f"{file} knows Python through {target}")
+    if folder != "base" and (name := VECTOR_CODE.search(text)):
+        faults.append(f"{file} has {name[0]}, which is for cpp/base")
     return faults
 
 
@@ -87,6 +92,15 @@ def test_includes_point_down_only() -> None:
     assert not faults
 
 
+def test_every_header_is_included() -> None:
+    files = repository.tracked_files("cpp/*.h", "cpp/*.cpp", "compare/benchmarks/*.cpp")
+    texts = {file: (repository.ROOT / file).read_text() for file in files}
+    included = {target for text in texts.values() for _, target in INCLUDE.findall(text)}
+    headers = {f.relative_to("cpp").as_posix() for f in files if f.suffix == ".h"}
+    assert headers
+    assert not headers - included
+
+
 def test_third_parties_come_in_where_they_should() -> None:
     for library, entries in ENTRIES.items():
         for entry in entries:
@@ -115,6 +129,9 @@ def test_imports_point_down_only() -> None:
         ("mlrta/a.cpp", "#include <Python.h>"),
         ("base/a.h", '#include "vec.h"'),
         ("kdtree/a.h", "#include <drjit/array.h>"),
+        ("mlrta/a.h", "return drjit::all(a);"),
+        ("traverse/a.cpp", "const auto a = _mm512_setzero_ps();"),
+        ("geometry/a.h", "__m256 a;"),
     ],
 )
 def test_wrong_includes_are_found(file: str, text: str) -> None:

@@ -10,8 +10,19 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import workloads
-from tracing import BRUTE_FORCE, Options, build, closest, each_core, interval, occluded
+from tracing import (
+    BRUTE_FORCE,
+    Hits,
+    Options,
+    build,
+    closest,
+    each_core,
+    interval,
+    occluded,
+)
 from workloads import Rays, Scene
+
+from mlrt_plugin.threads import thread_count
 
 SEED = 20261130
 SCENES = sorted(workloads.scenes(np.random.default_rng(SEED)))
@@ -201,6 +212,23 @@ def test_neighbours_share_steps(core: ModuleType) -> None:
     assert 0 < 3 * together["traversal_steps"] < apart["traversal_steps"]
     # A ray tests about the same triangles either way.
     assert 0 < together["triangle_tests"] < 1.5 * apart["triangle_tests"]
+
+
+@each_core
+@pytest.mark.parametrize("threads", [1, 2, 8])
+def test_same_hits_by_any_number_of_threads(core: ModuleType, threads: int) -> None:
+    """Of many copies of the rays, so that there is something to do for each thread."""
+    scene, rays = dense(np.random.default_rng(SEED))
+    tree = build(core, scene)
+    tree.widen()
+    once = closest(tree, rays, BRUTE_FORCE)
+    expected = Hits(*(np.tile(each, 8) for each in (once.t, once.face, once.u, once.v)))
+    origins, directions = (np.tile(each, (8, 1)) for each in rays)
+    with thread_count(threads):
+        for options in (WIDE, ADAPTIVE):
+            closest(tree, (origins, directions), options).assert_same(expected)
+            hit = occluded(tree, (origins, directions), options)
+            np.testing.assert_array_equal(hit, expected.face >= 0)
 
 
 @each_core

@@ -27,6 +27,9 @@ HitArrays = tuple[FloatArray, npt.NDArray[np.uint32]]
 Trace = Callable[[FloatArray, FloatArray], HitArrays]
 BACKGROUND = np.uint32(0xFFFFFFFF)
 SEED = 20261128
+ARRAY_MODES = ("r16 coherent", "r16 incoherent", "1M incoherent")
+"""Of Embree: packets of 16 rays, which it is told are coherent or not, and streams of
+single rays."""
 ENOUGH_SECONDS = 10.0
 """Runs that took longer than that in all are not repeated, once there are two; chosen."""
 OFF_THE_SURFACE = 1 - 2.0**-10
@@ -101,9 +104,8 @@ def run(
 
 
 def contenders(native: Native, scene: BenchScene, threads: int) -> dict[str, Trace]:
-    """MLRT as it traces by default, barycentric coordinates included, then Embree in
-    packets of 16 of rays that it is told are coherent or not. Arrays are read and written
-    by all of them."""
+    """MLRT as it traces by default, barycentric coordinates included, then Embree in each
+    of its modes. Arrays are read and written by all of them."""
     tree = KdTree(scene.vertices, scene.faces)
 
     def mlrt(origins: FloatArray, directions: FloatArray) -> HitArrays:
@@ -113,23 +115,21 @@ def contenders(native: Native, scene: BenchScene, threads: int) -> dict[str, Tra
     mesh = native.module.Mesh(scene.vertices, scene.faces)
     device = embree_device(native.module, threads)
 
-    def embree(quality: str, coherent: bool) -> Trace:
+    def embree(quality: str, mode: str) -> Trace:
         built: Any = native.module.EmbreeScene(device, mesh, quality == "HIGH")
 
         def closest_hit(origins: FloatArray, directions: FloatArray) -> HitArrays:
             t = np.empty(len(origins), np.float32)
             face = np.empty(len(origins), np.uint32)
-            built.closest_hit(origins, directions, t, face, coherent)
+            built.closest_hit(origins, directions, t, face, mode)
             return t, face
 
         return closest_hit
 
     return {MLRT: mlrt} | {
-        f"{EMBREE} {quality}, {'coherent' if coherent else 'incoherent'}": embree(
-            quality, coherent
-        )
+        f"{EMBREE} {quality}, {mode}": embree(quality, mode)
         for quality in QUALITIES
-        for coherent in (True, False)
+        for mode in ARRAY_MODES
     }
 
 

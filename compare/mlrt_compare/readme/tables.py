@@ -22,7 +22,7 @@ def ratio(value: float) -> str:
 
 
 def best_and_median(speedup: dict[str, Any]) -> str:
-    return f"{ratio(speedup['best'])} ({speedup['median']:.2f})"
+    return f"{ratio(speedup['best'])} ({ratio(speedup['median'])})"
 
 
 def machine_of(figures: dict[str, Any]) -> str:
@@ -85,8 +85,10 @@ def ray_lines(all_figures: Figures) -> list[str]:
     return [
         f"`mlrt-bench rays`: {pixels_of(all_figures)} pixels; the same rays by MLRT and by "
         "Embree 3 of the mitsuba wheel in whichever of its modes and build qualities is "
-        f"the fastest in the run. {disagreement(blocks)} Mrays/s are MLRT's. "
-        f"{machines_of(all_figures)}.",
+        "the fastest in the run, each with the best of its tiles "
+        f"({tiles_of(all_figures)}). "
+        f"{disagreement(blocks)} MLRT knows the camera and bounds beams by its film. "
+        f"Mrays/s are MLRT's. {machines_of(all_figures)}.",
         "",
         *table(head, rows),
         "",
@@ -105,6 +107,16 @@ def ray_cells(block: dict[str, Any]) -> tuple[str, str]:
     seconds = best(frame_seconds(own, "wall"))
     rays = sum(block["rays"].values())
     return best_and_median(block["speedup"]), number(1e-6 * rays / seconds)
+
+
+def tiles_of(all_figures: Figures) -> str:
+    """The sides of tiles that were tried, and how often each mode was run."""
+    tried = dict.fromkeys(
+        f"{' or '.join(map(str, each['settings']['tiles']))} rays a side, "
+        f"{each['settings']['repeats']} runs"
+        for each in all_figures
+    )
+    return "; ".join(tried)
 
 
 def disagreement(blocks: Figures) -> str:
@@ -239,8 +251,9 @@ def order_lines(all_figures: Figures) -> list[str]:
                 )
     return [
         "`mlrt-bench order`: nanoseconds a ray of arrays that `closest_hit` is given, by "
-        "MLRT and by Embree in whichever of its modes for arrays is the fastest for "
-        f"them; {pixels_of(all_figures)} rays. {machines_of(all_figures)}.",
+        "MLRT and by Embree in whichever is the fastest for them: packets of 16, told to "
+        "be coherent or not, or streams of single rays, at either build quality; "
+        f"{pixels_of(all_figures)} rays. {machines_of(all_figures)}.",
         "",
         *table(("scene", "", "rays", "MLRT ns", "Embree ns", "ratio"), rows),
     ]
