@@ -35,6 +35,11 @@ else()
     set(isa_flags_native "")
 endif()
 
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    include(CheckCXXCompilerFlag)
+    check_cxx_compiler_flag(-mmove-max=256 MLRT_HAS_MOVE_MAX)
+endif()
+
 # A Python module of parts of the core, for one instruction set.
 function(mlrt_add_module module isa)
     # Sanitizers tell where they find something by the symbols.
@@ -64,6 +69,11 @@ function(mlrt_add_module module isa)
         if(isa STREQUAL "avx2")
             target_compile_options(${module} PRIVATE
                 --param=max-inline-insns-auto=80 --param=large-stack-frame=8192)
+            # It copies them by 16 bytes, and what is then read by 32 waits until all of it
+            # has left the processor's store buffer.
+            if(MLRT_HAS_MOVE_MAX)
+                target_compile_options(${module} PRIVATE -mmove-max=256 -mstore-max=256)
+            endif()
         endif()
     endif()
     target_link_libraries(${module} PRIVATE ${drjit_root}/libnanothread.so)

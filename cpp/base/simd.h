@@ -43,6 +43,7 @@ inline constexpr uint32_t WIDE_WIDTH = BLOCK_WIDTH;
 #endif
 using FloatWide = drjit::Packet<float, WIDE_WIDTH>;
 using IntWide = drjit::Packet<int32_t, WIDE_WIDTH>;
+using UIntWide = drjit::Packet<uint32_t, WIDE_WIDTH>;
 
 // Four lanes: the coordinates of a point, and whatever lies behind them in memory.
 using PointPacket = drjit::Packet<float, 4>;
@@ -240,9 +241,10 @@ template <typename T>
         return MaskOf<T>(Half::from_k(uint8_t(bits)), Half::from_k(uint8_t(bits >> 8)));
     }
 #endif
+    using Bits = drjit::Packet<uint32_t, LANES_OF<T>>;
     static constexpr LaneArray<uint32_t> LANE_BIT = bit_of_each_lane();
-    const auto lane_bit = drjit::load_aligned<UIntPacket>(LANE_BIT.data());
-    return MaskOf<T>((UIntPacket(bits) & lane_bit) == lane_bit);
+    const auto lane_bit = drjit::load_aligned<Bits>(LANE_BIT.data());
+    return MaskOf<T>((Bits(bits) & lane_bit) == lane_bit);
 }
 
 inline float first_lane(const FloatPacket &packet) {
@@ -297,19 +299,6 @@ void store(Value *values, const Packet &packet) {
     drjit::store(values, packet);
 }
 
-// The first values, fewer than there are lanes, and zeros; nothing behind them is read.
-template <typename Packet = FloatPacket>
-Packet load_first(const float *values, uint32_t count) {
-#if defined(__AVX512F__)
-    if constexpr (std::is_same_v<Packet, FloatPacket>)
-        return Packet(_mm512_maskz_loadu_ps(__mmask16(first_lanes(count)), values));
-#endif
-    std::array<float, LANES_OF<Packet>> padded{};
-    for (uint32_t lane = 0; lane < count; ++lane)
-        padded[lane] = values[lane];
-    return drjit::load<Packet>(padded.data());
-}
-
 // values[indices[lane]] in each lane; indices below 2^31.
 inline FloatPacket gather(const float *values, const UIntPacket &indices) {
     return drjit::gather<FloatPacket>(values, indices);
@@ -333,39 +322,35 @@ Packet load(const LaneArray<Value> &lanes) {
     return drjit::load_aligned<Packet>(lanes.data());
 }
 
+// Calls work(lane) with the first lane of each register that a packet takes: where it takes
+// two, work on many packets at once keeps its values in registers only so.
+template <typename Work>
+[[gnu::always_inline]] inline void for_each_register(Work &&work) {
+    for (uint32_t lane = 0; lane < PACKET_WIDTH; lane += WIDE_WIDTH)
+        work(lane);
+}
+// That register of a packet.
+#if defined(__AVX512F__)
+inline void store_register(FloatPacket &packet, uint32_t, const FloatWide &values) {
+    packet = values;
+}
+inline const FloatWide &load_register(const FloatPacket &packet, uint32_t) {
+    return packet;
+}
+#else
+inline void store_register(FloatPacket &packet, uint32_t lane, const FloatWide &values) {
+    drjit::store_aligned(reinterpret_cast<float *>(&packet) + lane, values);
+}
+inline FloatWide load_register(const FloatPacket &packet, uint32_t lane) {
+    return drjit::load_aligned<FloatWide>(reinterpret_cast<const float *>(&packet) + lane);
+}
+#endif
+
 template <typename Value, typename Packet>
 LaneArray<Value> to_lanes(const Packet &packet) {
     LaneArray<Value> lanes;
     drjit::store_aligned(lanes.data(), packet);
     return lanes;
-}
-
-// Writes the lanes whose bit is set one after the other, and something else behind them:
-// there must be room for a whole packet.
-template <typename Packet, typename Value>
-void store_compressed(Value *values, const Packet &packet, LaneBits bits) {
-    if (drjit::size_v<Packet> == PACKET_WIDTH && bits == ALL_LANES) {
-        store(values, packet);
-        return;
-    }
-#if defined(__AVX512F__)
-    if constexpr (std::is_same_v<Packet, FloatPacket>) {
-        store(values, Packet(_mm512_maskz_compress_ps(__mmask16(bits), packet.m)));
-        return;
-    } else if constexpr (std::is_same_v<Packet, UIntPacket>) {
-        store(values, Packet(_mm512_maskz_compress_epi32(__mmask16(bits), packet.m)));
-        return;
-    } else if constexpr (std::is_same_v<Packet, FloatBlock>) {
-        store(values, Packet(_mm256_maskz_compress_ps(__mmask8(bits), packet.m)));
-        return;
-    } else if constexpr (std::is_same_v<Packet, UIntBlock>) {
-        store(values, Packet(_mm256_maskz_compress_epi32(__mmask8(bits), packet.m)));
-        return;
-    }
-#endif
-    std::array<Value, drjit::size_v<Packet>> lanes;
-    store(lanes.data(), packet);
-    for_each_lane(bits, [&](uint32_t lane) { *values++ = lanes[lane]; });
 }
 
 // The same vector in all lanes.

@@ -106,14 +106,14 @@ inline std::array<FloatPacket, 4> load_four_columns(const float *rows, size_t st
 #endif
 }
 
-// Sixteen packets, and a value of each.
-using PacketRows = std::array<FloatPacket, PACKET_WIDTH>;
+// A register of each of sixteen packets.
+using PacketRows = std::array<FloatWide, PACKET_WIDTH>;
 
 namespace simd_detail {
 
+// `better` keeps one of two values a lane. Halves the number of registers and of the values
+// that are left of each, until there is a value of each.
 #if defined(__AVX512F__)
-// `better` keeps one of two values a lane. Halves the number of packets and of the values
-// that are left of each, four times.
 template <typename Better>
 FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
     FloatPacket two[8], four[4];
@@ -134,32 +134,54 @@ FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
     };
     return halved(halved(four[0], four[1]), halved(four[2], four[3]));
 }
+#elif defined(__AVX__)
+template <typename Better>
+FloatBlock best_lanes_of_eight(const FloatWide *rows, Better &&better) {
+    FloatBlock two[4], four[2];
+    for (int i = 0; i < 4; ++i) {
+        const __m256 a = rows[2 * i].m, b = rows[2 * i + 1].m;
+        two[i] = better(FloatBlock(_mm256_unpacklo_ps(a, b)),
+                        FloatBlock(_mm256_unpackhi_ps(a, b)));
+    }
+    for (int i = 0; i < 2; ++i) {
+        const __m256d a = _mm256_castps_pd(two[2 * i].m);
+        const __m256d b = _mm256_castps_pd(two[2 * i + 1].m);
+        four[i] = better(FloatBlock(_mm256_castpd_ps(_mm256_unpacklo_pd(a, b))),
+                         FloatBlock(_mm256_castpd_ps(_mm256_unpackhi_pd(a, b))));
+    }
+    return better(FloatBlock(_mm256_permute2f128_ps(four[0].m, four[1].m, 0x20)),
+                  FloatBlock(_mm256_permute2f128_ps(four[0].m, four[1].m, 0x31)));
+}
+template <typename Better>
+FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
+    return FloatPacket(best_lanes_of_eight(rows.data(), better),
+                       best_lanes_of_eight(rows.data() + BLOCK_WIDTH, better));
+}
+#else
+template <typename Better>
+FloatPacket best_lanes(const PacketRows &rows, Better &&better) {
+    LaneArray<float> best;
+    for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
+        best[i] = rows[i].entry(0);
+        for (uint32_t lane = 1; lane < WIDE_WIDTH; ++lane)
+            best[i] = better(best[i], float(rows[i].entry(lane)));
+    }
+    return load<FloatPacket>(best);
+}
 #endif
 
 } // namespace simd_detail
 
-// Lane i of the result is the least lane of packet i. Lanes must be ordered (no NaN).
+// Lane i of the result is the least lane of row i. Lanes must be ordered (no NaN).
 inline FloatPacket least_lanes(const PacketRows &rows) {
-#if defined(__AVX512F__)
-    return simd_detail::best_lanes(rows, minimum<FloatPacket>);
-#else
-    LaneArray<float> least;
-    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
-        least[i] = least_lane(rows[i]);
-    return load<FloatPacket>(least);
-#endif
+    return simd_detail::best_lanes(
+        rows, [](const auto &a, const auto &b) { return minimum(a, b); });
 }
 
 // The same of the greatest lanes.
 inline FloatPacket greatest_lanes(const PacketRows &rows) {
-#if defined(__AVX512F__)
-    return simd_detail::best_lanes(rows, maximum<FloatPacket>);
-#else
-    LaneArray<float> greatest;
-    for (uint32_t i = 0; i < PACKET_WIDTH; ++i)
-        greatest[i] = greatest_lane(rows[i]);
-    return load<FloatPacket>(greatest);
-#endif
+    return simd_detail::best_lanes(
+        rows, [](const auto &a, const auto &b) { return maximum(a, b); });
 }
 
 } // namespace mlrt

@@ -1,5 +1,9 @@
-// What the tests ask of the floating-point environment of the core.
+// What the tests ask of the floating-point environment of the core, and of its packets.
+#include "base/partial_packets.h"
+#include "bind/arrays.h"
 #include "bind/bind.h"
+
+#include <vector>
 
 namespace mlrt {
 
@@ -11,10 +15,31 @@ float multiply_subtract(float a, float b, float c) {
     return a * b - c;
 }
 
+using FloatArray = nanobind::ndarray<const float, nanobind::ndim<1>, nanobind::device::cpu,
+                                     nanobind::c_contig>;
+
+// Of sixteen values those whose bit is set, one after the other.
+nanobind::object compressed(const FloatArray &values, LaneBits bits) {
+    std::vector<float> kept(2 * PACKET_WIDTH);
+    store_compressed(kept.data(), load<FloatPacket>(values.data()), bits);
+    const size_t count = size_t(__builtin_popcount(bits));
+    kept.resize(count);
+    return to_numpy<float>(std::move(kept), {count});
+}
+
+// A register of values, fewer than there are lanes, and zeros.
+nanobind::object padded(const FloatArray &values) {
+    std::vector<float> lanes(WIDE_WIDTH);
+    store(lanes.data(), load_first<FloatWide>(values.data(), uint32_t(values.shape(0))));
+    return to_numpy<float>(std::move(lanes), {WIDE_WIDTH});
+}
+
 } // namespace
 
 void bind_numerics(nanobind::module_ &m) {
     m.def("multiply_subtract", &multiply_subtract);
+    m.def("compressed", &compressed);
+    m.def("padded", &padded);
 }
 
 } // namespace mlrt

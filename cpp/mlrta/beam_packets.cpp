@@ -39,72 +39,83 @@ void BeamPackets::set_axes(Vec3f d) {
     side = d[k] > 0 ? 1.0f : -1.0f;
 }
 
-FloatPacket BeamPackets::load_packet(const RayGroup &rays, uint32_t last, uint32_t number) {
+// A register at a time, as all of its values would not fit into them else.
+[[gnu::flatten]] void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                                               uint32_t number, FarthestEnds &farthest) {
     BeamPacket &packet = packets[number];
     PacketLanes &of_rays = lanes[number];
-    const uint32_t first = of_rays.first_ray;
     const auto [i, j, k] = axes;
-    const FloatPacket di = load_padded(rays.direction[i], first, last);
-    const FloatPacket dj = load_padded(rays.direction[j], first, last);
-    const FloatPacket dk = load_padded(rays.direction[k], first, last);
-    // In this order NaN stays NaN, and the ray inactive.
-    const FloatPacket t_min =
-        maximum(FloatPacket(0.0f), load_padded(rays.t_min, first, last));
-    const FloatPacket t_max = load_padded(rays.t_max, first, last);
-    const FloatPacket main = dk * side;
-    const FloatPacket reciprocal = 1.0f / main;
-    packet.u = di * reciprocal;
-    packet.v = dj * reciprocal;
-
-    const FloatPacket size_u = absolute(packet.u), size_v = absolute(packet.v);
-    const auto inside = (main >= SMALLEST_MAIN) & (main <= LARGEST_MAIN) &
-                        (maximum(size_u, size_v) <= GREATEST_SLOPE) &
-                        ((size_u >= SMALLEST_SLOPE) | (di == 0.0f)) &
-                        ((size_v >= SMALLEST_SLOPE) | (dj == 0.0f));
-    const LaneBits finite = to_bits((absolute(di) < INFINITE) & (absolute(dj) < INFINITE) &
-                                    (absolute(dk) < INFINITE) & (t_min < t_max));
+    of_rays.active = of_rays.found = of_rays.strays = 0;
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    of_rays.active = to_bits(inside) & finite;
-    of_rays.found = of_rays.strays = 0;
-    if (of_rays.active != finite)
-        of_rays.strays =
-            finite & ~of_rays.active & to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f));
+    for_each_register([&](uint32_t lane) {
+        const uint32_t first = of_rays.first_ray + lane;
+        const Lanes di = load_padded<Lanes>(rays.direction[i], first, last);
+        const Lanes dj = load_padded<Lanes>(rays.direction[j], first, last);
+        const Lanes dk = load_padded<Lanes>(rays.direction[k], first, last);
+        const Lanes main = dk * side;
+        const Lanes reciprocal = 1.0f / main;
+        const Lanes u = di * reciprocal, v = dj * reciprocal;
+        store_register(packet.u, lane, u);
+        store_register(packet.v, lane, v);
+        const Lanes size_u = absolute(u), size_v = absolute(v);
+        const auto inside = (main >= SMALLEST_MAIN) & (main <= LARGEST_MAIN) &
+                            (maximum(size_u, size_v) <= GREATEST_SLOPE) &
+                            ((size_u >= SMALLEST_SLOPE) | (di == 0.0f)) &
+                            ((size_v >= SMALLEST_SLOPE) | (dj == 0.0f));
+        // In this order NaN stays NaN, and the ray inactive.
+        const Lanes t_min =
+            maximum(Lanes(0.0f), load_padded<Lanes>(rays.t_min, first, last));
+        const Lanes t_max = load_padded<Lanes>(rays.t_max, first, last);
+        const auto finite = (absolute(di) < INFINITE) & (absolute(dj) < INFINITE) &
+                            (absolute(dk) < INFINITE) & (t_min < t_max);
+        const auto active = inside & finite;
+        const LaneBits active_bits = to_bits(active), finite_bits = to_bits(finite);
+        of_rays.active |= active_bits << lane;
+        if (active_bits != finite_bits)
+            of_rays.strays |= (finite_bits & ~active_bits &
+                               to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f)))
+                              << lane;
 
-    set_ends(number, t_max, main);
-    return masked(of_rays.active,
-                  maximum(t_min, FloatPacket(SMALLEST_DISTANCE)) * main *
-                          (1 + WIDEN_DEPTH) +
-                      LEAST_DEPTH,
-                  0.0f);
+        const auto [least, greatest] = ends_of(t_max, main);
+        store_register(packet.least, lane, select(active, least, Lanes(INFINITE)));
+        store_register(packet.greatest, lane, greatest);
+        farthest.greatest =
+            maximum(select(active, greatest, Lanes(0.0f)), farthest.greatest);
+        const Lanes begin =
+            maximum(t_min, Lanes(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
+            LEAST_DEPTH;
+        farthest.begin = maximum(select(active, begin, Lanes(0.0f)), farthest.begin);
+    });
 }
 
 // One division for both bounds. What is rounded to a small t_max may exceed it by more than
 // that share, and small depths may have lost digits: nothing is certain of them.
-void BeamPackets::set_ends(uint32_t number, const FloatPacket &t_max,
-                           const FloatPacket &main) {
-    BeamPacket &packet = packets[number];
-    const FloatPacket end = t_max * main;
-    const FloatPacket at_end = 1.0f / end;
+BeamPackets::Ends BeamPackets::ends_of(const Lanes &t_max, const Lanes &main) {
+    const Lanes end = t_max * main;
+    const Lanes at_end = 1.0f / end;
     const auto moderate = (t_max >= SMALLEST_END) & (end >= SMALLEST_END);
-    packet.least =
-        masked(lanes[number].active,
-               select(moderate, at_end * (1 - WIDEN_DEPTH), FloatPacket(0.0f)), INFINITE);
-    packet.greatest = select(moderate, at_end * (1 + WIDEN_DEPTH), FloatPacket(INFINITE));
+    return {select(moderate, at_end * (1 - WIDEN_DEPTH), Lanes(0.0f)),
+            select(moderate, at_end * (1 + WIDEN_DEPTH), Lanes(INFINITE))};
 }
 
 // Of a packet whose rays are known to be active.
 void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
     BeamPacket &packet = packets[number];
-    const uint32_t first_ray = lanes[number].first_ray;
-    const auto component = [&](int axis) {
-        return mlrt::load<FloatPacket>(rays.direction[axis] + first_ray);
-    };
-    const FloatPacket main = component(axes[2]) * side;
-    const FloatPacket reciprocal = 1.0f / main;
-    packet.u = component(axes[0]) * reciprocal;
-    packet.v = component(axes[1]) * reciprocal;
+    for_each_register([&](uint32_t lane) {
+        const uint32_t first = lanes[number].first_ray + lane;
+        const auto component = [&](int axis) {
+            return mlrt::load<Lanes>(rays.direction[axis] + first);
+        };
+        const Lanes main = component(axes[2]) * side;
+        const Lanes reciprocal = 1.0f / main;
+        store_register(packet.u, lane, component(axes[0]) * reciprocal);
+        store_register(packet.v, lane, component(axes[1]) * reciprocal);
+        const auto [least, greatest] =
+            ends_of(load_padded<Lanes>(rays.t_max, first, rays.count), main);
+        store_register(packet.least, lane, least);
+        store_register(packet.greatest, lane, greatest);
+    });
     packet.primitive = UIntPacket(NO_PRIMITIVE);
-    set_ends(number, load_padded(rays.t_max, first_ray, rays.count), main);
     unloaded.remove(number);
 }
 
@@ -172,16 +183,16 @@ void BeamPackets::turn_as_rays() {
 // once more, with an error of at most 4 u (|u| + |v|).
 void BeamPackets::fit_rectangle() {
     const float c = rectangle.cosine, s = rectangle.sine;
-    const FloatPacket first_u(rectangle.center_u), first_v(rectangle.center_v);
+    const Lanes first_u(rectangle.center_u), first_v(rectangle.center_v);
     // Packets that are missing, and lanes that are not active, bound nothing.
-    const FloatPacket none_lo(INFINITE), none_hi(-INFINITE);
-    FloatPacket lo_u = none_lo, hi_u = none_hi, lo_v = none_lo, hi_v = none_hi;
+    const Lanes none_lo(INFINITE), none_hi(-INFINITE);
+    Lanes lo_u = none_lo, hi_u = none_hi, lo_v = none_lo, hi_v = none_hi;
     // Of each packet of a run, a lane each.
     struct Extents {
         FloatPacket p0, p1, q0, q1;
     };
     std::array<Extents, RUNS> extents;
-    Extents widest{none_lo, none_hi, none_lo, none_hi};
+    Extents widest{INFINITE, -INFINITE, INFINITE, -INFINITE};
     for (uint32_t r = 0; r < run_count(); ++r) {
         PacketRows lo_p, hi_p, lo_q, hi_q, least_of;
         for (uint32_t i = 0; i < PACKET_WIDTH; ++i) {
@@ -192,22 +203,30 @@ void BeamPackets::fit_rectangle() {
                 continue;
             }
             const BeamPacket &packet = packets[n];
-            const auto active = from_bits<FloatPacket>(lanes[n].active);
-            // Inactive lanes repeat the first ray of all.
-            const FloatPacket u = select(active, packet.u, first_u);
-            const FloatPacket v = select(active, packet.v, first_v);
-            lo_u = minimum(u, lo_u);
-            hi_u = maximum(u, hi_u);
-            lo_v = minimum(v, lo_v);
-            hi_v = maximum(v, hi_v);
-            const FloatPacket du = packet.u - first_u, dv = packet.v - first_v;
-            const FloatPacket p = fused(du, FloatPacket(c), dv * s);
-            const FloatPacket q = fused(dv, FloatPacket(c), du * -s);
-            lo_p[i] = select(active, p, none_lo);
-            hi_p[i] = select(active, p, none_hi);
-            lo_q[i] = select(active, q, none_lo);
-            hi_q[i] = select(active, q, none_hi);
-            least_of[i] = packet.least;
+            for_each_register([&](uint32_t lane) {
+                const auto active = from_bits<Lanes>(lanes[n].active >> lane);
+                const Lanes packet_u = load_register(packet.u, lane);
+                const Lanes packet_v = load_register(packet.v, lane);
+                // Inactive lanes repeat the first ray of all.
+                const Lanes u = select(active, packet_u, first_u);
+                const Lanes v = select(active, packet_v, first_v);
+                lo_u = minimum(u, lo_u);
+                hi_u = maximum(u, hi_u);
+                lo_v = minimum(v, lo_v);
+                hi_v = maximum(v, hi_v);
+                const Lanes du = packet_u - first_u, dv = packet_v - first_v;
+                const Lanes p = fused(du, Lanes(c), dv * s);
+                const Lanes q = fused(dv, Lanes(c), du * -s);
+                const auto add = [&](Lanes &row, const Lanes &values, auto &&better) {
+                    row = lane == 0 ? values : better(values, row);
+                };
+                const auto lower = minimum<Lanes>, upper = maximum<Lanes>;
+                add(lo_p[i], select(active, p, none_lo), lower);
+                add(hi_p[i], select(active, p, none_hi), upper);
+                add(lo_q[i], select(active, q, none_lo), lower);
+                add(hi_q[i], select(active, q, none_hi), upper);
+                add(least_of[i], load_register(packet.least, lane), lower);
+            });
         }
         store(runs[r].least.data(), least_lanes(least_of));
         const Extents &of_run = extents[r] = {least_lanes(lo_p), greatest_lanes(hi_p),
@@ -291,12 +310,11 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
         return;
     covered = unloaded = {};
     std::optional<uint32_t> first_active;
-    FloatPacket begin = 0.0f, end = 0.0f;
+    FarthestEnds farthest;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
         const uint32_t n = count++;
         lanes[n].first_ray = i;
-        begin = maximum(load_packet(rays, first + ray_count, n), begin);
-        end = maximum(masked(lanes[n].active, packets[n].greatest, 0.0f), end);
+        load_packet(rays, first + ray_count, n, farthest);
         if (lanes[n].active != 0 && !first_active)
             first_active = n;
         any_stray |= lanes[n].strays != 0;
@@ -304,7 +322,7 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     if (!first_active)
         return;
     any_active = true;
-    nearest = (1 - WIDEN_DEPTH) / greatest_lane(begin);
+    nearest = (1 - WIDEN_DEPTH) / greatest_lane(farthest.begin);
     const uint32_t lane = uint32_t(__builtin_ctz(lanes[*first_active].active));
     rectangle = {};
     rectangle.center_u = to_lanes<float>(packets[*first_active].u)[lane];
@@ -314,8 +332,9 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     else
         turn_as_rays();
     fit_rectangle();
+    const float end = greatest_lane(farthest.greatest);
     for (uint32_t r = 0; r < run_count(); ++r)
-        runs[r].greatest.fill(greatest_lane(end));
+        runs[r].greatest.fill(end);
 }
 
 } // namespace mlrt

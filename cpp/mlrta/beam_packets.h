@@ -195,13 +195,22 @@ private:
     // Returns the ray that it was chosen by, if any is active.
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);
-    // Returns the depths at which rays begin, or zero where they are not active.
-    FloatPacket load_packet(const RayGroup &rays, uint32_t last, uint32_t number);
+    // Of the active rays so far: the greatest depths at which they begin, and bounds of the
+    // reciprocal depths at which they end.
+    using Lanes = FloatWide;
+    struct FarthestEnds {
+        Lanes begin = 0.0f, greatest = 0.0f;
+    };
+    void load_packet(const RayGroup &rays, uint32_t last, uint32_t number,
+                     FarthestEnds &farthest);
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last, uint32_t number,
                                      FloatPacket &reach);
     void settle_packet(const RayGroup &rays, uint32_t number);
     void load_camera_packet(const RayGroup &rays, uint32_t number);
-    void set_ends(uint32_t number, const FloatPacket &t_max, const FloatPacket &main);
+    struct Ends {
+        Lanes least, greatest; // bounds of reciprocal depths
+    };
+    static Ends ends_of(const Lanes &t_max, const Lanes &main);
     void fit_to_film(const CameraTile &tile, uint32_t first, const FilmSlopes &slopes);
     void set_middles(const CameraTile &tile, uint32_t first_of_run,
                      const FilmRectangle &packet, LaneBits there, Run &run) const;

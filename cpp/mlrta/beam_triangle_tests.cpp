@@ -214,8 +214,9 @@ template <Query query>
 bool BeamTriangleTests<query>::test_packet(uint32_t number, const TriangleForms &forms,
                                            uint32_t lane, uint32_t primitive) {
     const Seen seen = see(number, forms, lane);
-    const LaneBits found = to_bits(seen.possible & seen.certain & seen.nearer);
-    take(number, found, seen.lowest, seen.highest, primitive);
+    const auto hit = seen.possible & seen.certain & seen.nearer;
+    const LaneBits found = to_bits(hit);
+    take(number, hit, found, seen.lowest, seen.highest, primitive);
     const LaneBits open = EXACT ? to_bits(seen.possible) & ~found : 0;
     if (open != 0) [[unlikely]]
         return decide_open(number, forms, lane, primitive, open);
@@ -231,14 +232,13 @@ BeamTriangleTests<query>::decide_open(uint32_t number, const TriangleForms &form
     return true;
 }
 
-// Hits of a triangle at depths that have these bounds.
+// Hits of a triangle at depths that have these bounds; `mask` has the same lanes.
 template <Query query>
-void BeamTriangleTests<query>::take(uint32_t number, LaneBits lanes,
-                                    const FloatPacket &lowest, const FloatPacket &highest,
-                                    uint32_t primitive) {
+void BeamTriangleTests<query>::take(uint32_t number, const MaskOf<FloatPacket> &mask,
+                                    LaneBits lanes, const FloatPacket &lowest,
+                                    const FloatPacket &highest, uint32_t primitive) {
     BeamPacket &packet = beam_.packets[number];
     beam_.lanes[number].found |= lanes;
-    const auto mask = from_bits<FloatPacket>(lanes);
     if constexpr (query == Query::any) {
         packet.least = select(mask, FloatPacket(INFINITE), packet.least);
     } else {

@@ -70,7 +70,11 @@ private:
                      uint32_t primitive, LaneBits open);
     void decide(uint32_t packet, LaneBits lanes, const Seen &seen, uint32_t primitive);
     void take(uint32_t packet, LaneBits lanes, const FloatPacket &lowest,
-              const FloatPacket &highest, uint32_t primitive);
+              const FloatPacket &highest, uint32_t primitive) {
+        take(packet, from_bits<FloatPacket>(lanes), lanes, lowest, highest, primitive);
+    }
+    void take(uint32_t packet, const MaskOf<FloatPacket> &mask, LaneBits lanes,
+              const FloatPacket &lowest, const FloatPacket &highest, uint32_t primitive);
     void decide_parallel(uint32_t packet, LaneBits lanes, LaneBits certain_hits,
                          uint32_t primitive);
     void update_least(const BeamPackets::Packets &packets);

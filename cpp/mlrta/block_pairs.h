@@ -2,6 +2,7 @@
 // whose ends are easy to foresee.
 #pragma once
 
+#include "base/partial_packets.h"
 #include "base/simd.h"
 #include "mlrta/beam_packets.h"
 
@@ -29,8 +30,8 @@ public:
     // Adds those of a run with the triangles in the given lanes.
     void add(uint32_t run, LaneBits triangles) {
         store_compressed(pairs_.data() + count_,
-                         lane_indices() * BeamPackets::CAPACITY +
-                             UIntPacket(run * PACKET_WIDTH),
+                         lane_numbers<UIntWide>() * BeamPackets::CAPACITY +
+                             UIntWide(run * PACKET_WIDTH),
                          triangles);
         count_ += uint32_t(std::popcount(triangles));
     }
@@ -39,7 +40,7 @@ public:
 
 private:
     // What is written comes in whole packets.
-    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + PACKET_WIDTH> pairs_;
+    std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + WIDE_WIDTH> pairs_;
     uint32_t count_ = 0;
 };
 

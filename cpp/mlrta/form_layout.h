@@ -45,7 +45,7 @@ struct VertexBox {
 };
 
 // Stores the box, wider by `slack` on each side, and without bounds where a vertex does not
-// lie ahead. Returns whether it touches the beam's rectangle.
+// lie ahead. Returns whether it is known to miss the beam's rectangle.
 template <typename Real>
 MaskOf<Real> TriangleForms::put_box(const LaidRectangle<Real> &rectangle,
                                     const VertexBox<Real> &box, const Real &slack,
@@ -56,9 +56,9 @@ MaskOf<Real> TriangleForms::put_box(const LaidRectangle<Real> &rectangle,
         const Real extent = select(ahead, 0.5f * (hi - lo) + slack, Real(INFINITE));
         store(middles, middle);
         store(extents, extent);
-        return absolute(middle) <= extent + half;
+        return absolute(middle) > extent + half;
     };
-    return put(box.lo_p, box.hi_p, rectangle.half_p, box_p, box_half_p) &
+    return put(box.lo_p, box.hi_p, rectangle.half_p, box_p, box_half_p) |
            put(box.lo_q, box.hi_q, rectangle.half_q, box_q, box_half_q);
 }
 

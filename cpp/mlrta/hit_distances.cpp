@@ -43,9 +43,10 @@ constexpr float LARGEST_ERROR = 0x1p-33f;
 // Covers the roundings of the bounds themselves.
 constexpr double ROUNDED_UP = 1 + 0x1p-20;
 
-Vec3<FloatPacket> directions_of(const RayGroup &rays, uint32_t first_ray) {
-    return by_axis(
-        [&](int k) { return load_padded(rays.direction[k], first_ray, rays.count); });
+Vec3<FloatWide> directions_of(const RayGroup &rays, uint32_t first_ray) {
+    return by_axis([&](int k) {
+        return load_padded<FloatWide>(rays.direction[k], first_ray, rays.count);
+    });
 }
 
 } // namespace
@@ -109,42 +110,100 @@ void HitDistances::prepare(std::span<const uint32_t> primitives) {
     put_planes(missing);
 }
 
+template <typename Value>
+HitDistances::Rounded HitDistances::rounded(const Vec3<FloatWide> &d,
+                                            const Planes<Value> &planes) {
+    using Lanes = FloatWide;
+    if constexpr (!EXACT_DISTANCES) {
+        const auto of = [&](int k) { return Lanes(planes.normal[k]); };
+        return {1.0f / fused(d.x, of(0), fused(d.y, of(1), d.z * of(2))), ALL_LANES};
+    }
+    const Lanes largest = largest_component(d);
+    // Sums keep of each product what the last place of the anchor holds.
+    const Lanes anchor = largest * Lanes(planes.anchor);
+    const Lanes one = fused(d.x, Lanes(planes.normal[0]), anchor);
+    const Lanes two = fused(d.y, Lanes(planes.normal[1]), one);
+    const Lanes three = fused(d.z, Lanes(planes.normal[2]), two);
+    const Lanes sum = three - anchor;
+    const auto rest_of = [&](int k, const Lanes &not_kept) {
+        const Lanes lost = fused(d[k], Lanes(planes.normal[k]), not_kept);
+        return fused(d[k], Lanes(planes.rest[k]), lost);
+    };
+    const Lanes rest =
+        (rest_of(0, anchor - one) + rest_of(1, one - two)) + rest_of(2, two - three);
+
+    const Lanes about = reciprocal_estimate(sum);
+    const Lanes left =
+        fused_difference(rest, about, fused_difference(sum, about, Lanes(1.0f)));
+    const Lanes correction = about * fused(left, left, left);
+    const Lanes error = absolute(largest * about) * Lanes(planes.error);
+    // Both ends of the range; not equal if anything is not a number.
+    const Lanes values = about + fused(about, error, correction);
+    const Lanes others = about + fused_difference(about, error, correction);
+    return {values, to_bits((values == others) & (error <= LARGEST_ERROR))};
+}
+
 const HitDistances::Plane &HitDistances::plane_of(uint32_t primitive) {
     if (!knows(primitive)) [[unlikely]]
         prepare({&primitive, 1});
     return planes_[primitive % SIZE];
 }
 
-template <typename Value>
-HitDistances::Rounded HitDistances::rounded(const Vec3<FloatPacket> &d,
-                                            const Planes<Value> &planes) {
-    if constexpr (!EXACT_DISTANCES) {
-        const auto of = [&](int k) { return FloatPacket(planes.normal[k]); };
-        return {1.0f / fused(d.x, of(0), fused(d.y, of(1), d.z * of(2))), ALL_LANES};
-    }
-    const FloatPacket largest = largest_component(d);
-    // Sums keep of each product what the last place of the anchor holds.
-    const FloatPacket anchor = largest * FloatPacket(planes.anchor);
-    const FloatPacket one = fused(d.x, FloatPacket(planes.normal[0]), anchor);
-    const FloatPacket two = fused(d.y, FloatPacket(planes.normal[1]), one);
-    const FloatPacket three = fused(d.z, FloatPacket(planes.normal[2]), two);
-    const FloatPacket sum = three - anchor;
-    const auto rest_of = [&](int k, const FloatPacket &not_kept) {
-        const FloatPacket lost = fused(d[k], FloatPacket(planes.normal[k]), not_kept);
-        return fused(d[k], FloatPacket(planes.rest[k]), lost);
-    };
-    const FloatPacket rest =
-        (rest_of(0, anchor - one) + rest_of(1, one - two)) + rest_of(2, two - three);
+bool HitDistances::knows_all(const UIntPacket &primitives) const {
+    const LaneArray<uint32_t> numbers = to_lanes<uint32_t>(primitives);
+    for (const uint32_t primitive : numbers)
+        if (!knows(primitive)) [[unlikely]]
+            return false;
+    return true;
+}
 
-    const FloatPacket about = reciprocal_estimate(sum);
-    const FloatPacket left =
-        fused_difference(rest, about, fused_difference(sum, about, FloatPacket(1.0f)));
-    const FloatPacket correction = about * fused(left, left, left);
-    const FloatPacket error = absolute(largest * about) * FloatPacket(planes.error);
-    // Both ends of the range; not equal if anything is not a number.
-    const FloatPacket values = about + fused(about, error, correction);
-    const FloatPacket others = about + fused_difference(about, error, correction);
-    return {values, to_bits((values == others) & (error <= LARGEST_ERROR))};
+// Returns the lanes of which that is not possible, as others take their places.
+[[gnu::noinline]] LaneBits HitDistances::prepare_all(const UIntPacket &primitives) {
+    std::array<uint32_t, PACKET_WIDTH> distinct;
+    uint32_t count = 0;
+    for_each_value(primitives, ALL_LANES,
+                   [&](uint32_t primitive, LaneBits) { distinct[count++] = primitive; });
+    prepare({distinct.data(), count});
+    LaneBits unknown = 0;
+    for_each_value(primitives, ALL_LANES, [&](uint32_t primitive, LaneBits holders) {
+        if (!knows(primitive))
+            unknown |= holders;
+    });
+    return unknown;
+}
+
+// Of triangles that are all known where that is asked for.
+HitDistances::Planes<FloatWide> HitDistances::planes_of(const UIntPacket &primitives,
+                                                        uint32_t lane) {
+    std::array<FloatWide, 8> columns;
+    if constexpr (BY_TRIANGLE) {
+        // From both ends, since there are few triangles, and one takes long to be told from
+        // the next.
+        const auto put = [&](uint32_t primitive, LaneBits holders) {
+            const float *const row = plane_of(primitive).normal;
+            const auto mask = from_bits<FloatWide>(holders);
+            for (size_t n = 0; n < columns.size(); ++n)
+                columns[n] = select(mask, FloatWide(row[n]), columns[n]);
+        };
+        for (LaneBits left = ALL_LANES; left != 0;) {
+            const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
+            const uint32_t other = lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
+            const LaneBits of_one = to_bits(primitives == UIntPacket(one));
+            const LaneBits of_other = to_bits(primitives == UIntPacket(other));
+            put(one, of_one);
+            put(other, of_other);
+            left &= ~(of_one | of_other);
+        }
+    } else {
+        std::array<const float *, WIDE_WIDTH> rows;
+        for (uint32_t n = 0; n < WIDE_WIDTH; ++n)
+            rows[n] = planes_[lane_of(primitives, lane + n) % SIZE].normal;
+        columns = load_columns(rows);
+    }
+    return {{columns[0], columns[1], columns[2]},
+            columns[3],
+            {columns[4], columns[5], columns[6]},
+            columns[7]};
 }
 
 // All that needs a frame of the stack is called at the end, with no more arguments than go
@@ -158,19 +217,25 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
         return of_several(rays, first_ray, lanes, primitives, counters);
     if (!knows(first)) [[unlikely]]
         return of_new(rays, first_ray, lanes, primitives, counters);
-    const Rounded distances =
-        rounded<float>(directions_of(rays, first_ray), planes_[first % SIZE]);
-    const LaneBits open = lanes & ~distances.certain;
+    const Plane &plane = planes_[first % SIZE];
+    FloatPacket values;
+    LaneBits open = lanes;
+    for_each_register([&](uint32_t lane) {
+        const Rounded part = rounded<float>(directions_of(rays, first_ray + lane), plane);
+        store_register(values, lane, part.values);
+        open &= ~(part.certain << lane);
+    });
     if (open == 0) [[likely]]
-        return distances.values;
-    return with_ones(distances.values, rays, first_ray, open, primitives, counters);
+        return values;
+    return with_ones(values, rays, first_ray, open, primitives, counters);
 }
 
 [[gnu::noinline]] FloatPacket HitDistances::of_new(const RayGroup &rays, uint32_t first_ray,
                                                    LaneBits lanes,
                                                    const UIntPacket &primitives,
                                                    Counters &counters) {
-    plane_of(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
+    const uint32_t primitive = lane_of(primitives, uint32_t(std::countr_zero(lanes)));
+    prepare({&primitive, 1});
     return of(rays, first_ray, lanes, primitives, counters);
 }
 
@@ -178,36 +243,22 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
                                                        uint32_t first_ray, LaneBits lanes,
                                                        const UIntPacket &primitives,
                                                        Counters &counters) {
-    Planes<FloatPacket> planes;
-    const auto put = [&](uint32_t primitive, LaneBits holders) {
-        const Plane &plane = plane_of(primitive);
-        const auto mask = from_bits<FloatPacket>(holders);
-        const auto put_value = [&](FloatPacket &values, float value) {
-            values = select(mask, FloatPacket(value), values);
-        };
-        for (int k = 0; k < 3; ++k) {
-            put_value(planes.normal[k], plane.normal[k]);
-            put_value(planes.rest[k], plane.rest[k]);
-        }
-        put_value(planes.anchor, plane.anchor);
-        put_value(planes.error, plane.error);
-    };
-    // From both ends, since there are few triangles, and one takes long to be told from the
-    // next.
-    for (LaneBits left = lanes; left != 0;) {
-        const uint32_t one = lane_of(primitives, uint32_t(std::countr_zero(left)));
-        const uint32_t other = lane_of(primitives, uint32_t(std::bit_width(left)) - 1);
-        const LaneBits of_one = to_bits(primitives == UIntPacket(one));
-        const LaneBits of_other = to_bits(primitives == UIntPacket(other));
-        put(one, of_one);
-        put(other, of_other);
-        left &= ~(of_one | of_other);
-    }
-    const Rounded distances = rounded(directions_of(rays, first_ray), planes);
-    const LaneBits open = lanes & ~distances.certain;
+    FloatPacket values;
+    LaneBits open = lanes;
+    // Lanes that are not asked for have what another one has.
+    const UIntPacket any(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
+    const UIntPacket held = select(from_bits<UIntPacket>(lanes), primitives, any);
+    const LaneBits unknown = BY_TRIANGLE || knows_all(held) ? 0 : prepare_all(held);
+    for_each_register([&](uint32_t lane) {
+        const Rounded part =
+            rounded(directions_of(rays, first_ray + lane), planes_of(held, lane));
+        store_register(values, lane, part.values);
+        open &= ~(part.certain << lane);
+    });
+    open |= lanes & unknown;
     if (open == 0)
-        return distances.values;
-    return with_ones(distances.values, rays, first_ray, open, primitives, counters);
+        return values;
+    return with_ones(values, rays, first_ray, open, primitives, counters);
 }
 
 // Where single precision leaves some open.

@@ -118,7 +118,7 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
                                           Vec2<Real>{fc.x, fc.y}});
     const Real slack = (32 * FLOAT_ROUNDOFF) * (local + rays) +
                        float(DOUBLE_ROUNDINGS) * size + 2.0f * uncertainty;
-    MaskOf<Real> inside = safe & put_box(rectangle, box, slack, MaskOf<Real>(true));
+    MaskOf<Real> inside = safe & ~put_box(rectangle, box, slack, MaskOf<Real>(true));
     possible = to_bits(inside) & safe_bits;
     if (possible == 0)
         return;

@@ -1,6 +1,7 @@
 #include "mlrta/regroup.h"
 
 #include "base/check.h"
+#include "base/partial_packets.h"
 
 #include <algorithm>
 #include <bit>

@@ -57,6 +57,25 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     const LaneBits given = (1u << count) - 1;
     MaskOf<Real> safe = EXACT ? size < LARGEST_SIZE : MaskOf<Real>(true);
 
+    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
+    // two products and a sum follow, and the middle and extent of all: less than 16 of at
+    // most the greatest coordinate and S.
+    const LaidRectangle<Real> rectangle(beam.rectangle);
+    const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
+        const Real reciprocal = 1.0f / (v.z * beam.side);
+        return {v.x * reciprocal, v.y * reciprocal};
+    };
+    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
+    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
+    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
+                       SMALLEST_DEPTH;
+    // That takes no more of a triangle than that its vertices are moderate: of most others
+    // nothing else need be known.
+    const MaskOf<Real> misses = put_box(rectangle, box, slack, ahead);
+    possible = unsafe = 0;
+    if ((given & ~to_bits(misses & safe)) == 0)
+        return;
+
     const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
     Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
     Real volume;
@@ -97,25 +116,12 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         unsafe = 0;
     }
     const LaneBits safe_bits = to_bits(safe) & given;
-    possible = 0;
     if (safe_bits == 0)
         return;
     store(edge_error, edge_bound);
     store(ray_error, ray_bound);
 
-    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
-    // two products and a sum follow, and the middle and extent of all: less than 16 of at
-    // most the greatest coordinate and S.
-    const LaidRectangle<Real> rectangle(beam.rectangle);
-    const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
-        const Real reciprocal = 1.0f / (v.z * beam.side);
-        return {v.x * reciprocal, v.y * reciprocal};
-    };
-    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
-    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
-    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
-                       SMALLEST_DEPTH;
-    MaskOf<Real> inside = safe & put_box(rectangle, box, slack, ahead);
+    MaskOf<Real> inside = safe & ~misses;
     possible = to_bits(inside) & safe_bits;
     if (possible == 0)
         return;

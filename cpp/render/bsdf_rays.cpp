@@ -1,6 +1,7 @@
 #include "render/bsdf_rays.h"
 
 #include "base/lane_bits.h"
+#include "base/partial_packets.h"
 #include "mlrta/trace_unordered.h"
 #include "objects/trace_objects.h"
 #include "render/emitter_density.h"

@@ -3,6 +3,7 @@
 
 #include "base/aligned_vector.h"
 #include "base/counters.h"
+#include "base/partial_packets.h"
 #include "base/simd.h"
 #include "mlrta/trace.h"
 #include "render/prepared_scene.h"

@@ -1,6 +1,7 @@
 // From the arrays of a group to packets.
 #pragma once
 
+#include "base/partial_packets.h"
 #include "geometry/ray_packet.h"
 #include "traverse/ray_group.h"
 
@@ -18,7 +19,8 @@ struct LoadedPacket {
     LaneBits extreme = 0;
 };
 
-// As many values as there are lanes from `first` on; what lies past `count` reads as zero.
+// As many values as there are lanes from `first` on, which may lie past `count`; what does
+// reads as zero.
 template <typename Packet = FloatPacket>
 [[gnu::always_inline]] inline Packet load_padded(const float *values, uint32_t first,
                                                  uint32_t count) {
@@ -36,7 +38,7 @@ template <typename Packet = FloatPacket>
     const Packet common(ends.common());
     if (first + LANES_OF<Packet> <= count)
         return common;
-    return select(lane_numbers<Packet>() < Packet(float(count - first)), common,
+    return select(lane_numbers<Packet>() < Packet(float(int32_t(count - first))), common,
                   Packet(0.0f));
 }
 

@@ -1,6 +1,7 @@
 #include "traverse/wide.h"
 
 #include "base/block_order.h"
+#include "base/partial_packets.h"
 #include "geometry/block_volumes.h"
 #include "geometry/packet_distances.h"
 #include "traverse/wide_scene.h"

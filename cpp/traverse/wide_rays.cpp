@@ -1,5 +1,6 @@
 #include "traverse/wide_rays.h"
 
+#include "base/partial_packets.h"
 #include "base/transpose.h"
 #include "kdtree/wide_tree.h"
 
