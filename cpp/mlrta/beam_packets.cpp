@@ -40,15 +40,16 @@ void BeamPackets::set_axes(Vec3f d) {
 }
 
 // A register at a time, as all of its values would not fit into them else.
-[[gnu::flatten]] void BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
-                                               uint32_t number, FarthestEnds &farthest) {
+BeamPackets::FarthestEnds BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
+                                                   uint32_t number) {
     BeamPacket &packet = packets[number];
     PacketLanes &of_rays = lanes[number];
     const auto [i, j, k] = axes;
-    of_rays.active = of_rays.found = of_rays.strays = 0;
-    packet.primitive = UIntPacket(NO_PRIMITIVE);
-    for_each_register([&](uint32_t lane) {
-        const uint32_t first = of_rays.first_ray + lane;
+    const uint32_t first_ray = of_rays.first_ray;
+    LaneBits all_active = 0, strays = 0;
+    FarthestEnds farthest;
+    for_each_register([&](uint32_t lane) __attribute__((always_inline)) {
+        const uint32_t first = first_ray + lane;
         const Lanes di = load_padded<Lanes>(rays.direction[i], first, last);
         const Lanes dj = load_padded<Lanes>(rays.direction[j], first, last);
         const Lanes dk = load_padded<Lanes>(rays.direction[k], first, last);
@@ -70,11 +71,11 @@ void BeamPackets::set_axes(Vec3f d) {
                             (absolute(dk) < INFINITE) & (t_min < t_max);
         const auto active = inside & finite;
         const LaneBits active_bits = to_bits(active), finite_bits = to_bits(finite);
-        of_rays.active |= active_bits << lane;
+        all_active |= active_bits << lane;
         if (active_bits != finite_bits)
-            of_rays.strays |= (finite_bits & ~active_bits &
-                               to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f)))
-                              << lane;
+            strays |= (finite_bits & ~active_bits &
+                       to_bits((di != 0.0f) | (dj != 0.0f) | (dk != 0.0f)))
+                      << lane;
 
         const auto [least, greatest] = ends_of(t_max, main);
         store_register(packet.least, lane, select(active, least, Lanes(INFINITE)));
@@ -86,6 +87,11 @@ void BeamPackets::set_axes(Vec3f d) {
             LEAST_DEPTH;
         farthest.begin = maximum(select(active, begin, Lanes(0.0f)), farthest.begin);
     });
+    packet.primitive = UIntPacket(NO_PRIMITIVE);
+    of_rays.active = all_active;
+    of_rays.found = 0;
+    of_rays.strays = strays;
+    return farthest;
 }
 
 // One division for both bounds. What is rounded to a small t_max may exceed it by more than
@@ -101,7 +107,7 @@ BeamPackets::Ends BeamPackets::ends_of(const Lanes &t_max, const Lanes &main) {
 // Of a packet whose rays are known to be active.
 void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
     BeamPacket &packet = packets[number];
-    for_each_register([&](uint32_t lane) {
+    for_each_register([&](uint32_t lane) __attribute__((always_inline)) {
         const uint32_t first = lanes[number].first_ray + lane;
         const auto component = [&](int axis) {
             return mlrt::load<Lanes>(rays.direction[axis] + first);
@@ -203,7 +209,7 @@ void BeamPackets::fit_rectangle() {
                 continue;
             }
             const BeamPacket &packet = packets[n];
-            for_each_register([&](uint32_t lane) {
+            for_each_register([&](uint32_t lane) __attribute__((always_inline)) {
                 const auto active = from_bits<Lanes>(lanes[n].active >> lane);
                 const Lanes packet_u = load_register(packet.u, lane);
                 const Lanes packet_v = load_register(packet.v, lane);
@@ -314,7 +320,9 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
         const uint32_t n = count++;
         lanes[n].first_ray = i;
-        load_packet(rays, first + ray_count, n, farthest);
+        const FarthestEnds ends = load_packet(rays, first + ray_count, n);
+        farthest.begin = maximum(ends.begin, farthest.begin);
+        farthest.greatest = maximum(ends.greatest, farthest.greatest);
         if (lanes[n].active != 0 && !first_active)
             first_active = n;
         any_stray |= lanes[n].strays != 0;

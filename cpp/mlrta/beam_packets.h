@@ -195,14 +195,13 @@ private:
     // Returns the ray that it was chosen by, if any is active.
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);
-    // Of the active rays so far: the greatest depths at which they begin, and bounds of the
-    // reciprocal depths at which they end.
+    // Of active rays: the greatest depths at which they begin, and bounds of the reciprocal
+    // depths at which they end.
     using Lanes = FloatWide;
     struct FarthestEnds {
         Lanes begin = 0.0f, greatest = 0.0f;
     };
-    void load_packet(const RayGroup &rays, uint32_t last, uint32_t number,
-                     FarthestEnds &farthest);
+    FarthestEnds load_packet(const RayGroup &rays, uint32_t last, uint32_t number);
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last, uint32_t number,
                                      FloatPacket &reach);
     void settle_packet(const RayGroup &rays, uint32_t number);

@@ -220,7 +220,7 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
     const Plane &plane = planes_[first % SIZE];
     FloatPacket values;
     LaneBits open = lanes;
-    for_each_register([&](uint32_t lane) {
+    for_each_register([&](uint32_t lane) __attribute__((always_inline)) {
         const Rounded part = rounded<float>(directions_of(rays, first_ray + lane), plane);
         store_register(values, lane, part.values);
         open &= ~(part.certain << lane);
@@ -249,7 +249,7 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
     const UIntPacket any(lane_of(primitives, uint32_t(std::countr_zero(lanes))));
     const UIntPacket held = select(from_bits<UIntPacket>(lanes), primitives, any);
     const LaneBits unknown = BY_TRIANGLE || knows_all(held) ? 0 : prepare_all(held);
-    for_each_register([&](uint32_t lane) {
+    for_each_register([&](uint32_t lane) __attribute__((always_inline)) {
         const Rounded part =
             rounded(directions_of(rays, first_ray + lane), planes_of(held, lane));
         store_register(values, lane, part.values);
