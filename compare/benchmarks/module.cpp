@@ -36,22 +36,19 @@ const EnumNames<EmbreeMode> EMBREE_MODES{{"r16", EmbreeMode::packet},
                                          {"NM16", EmbreeMode::stream_of_16},
                                          {"1M", EmbreeMode::single_stream}};
 
-EmbreeMode embree_mode_from(const std::string &name) {
-    for (const auto &[known, mode] : EMBREE_MODES)
-        if (name == known)
-            return mode;
-    refuse_value("mode must be r16, NM8, NM16 or 1M.");
-}
-
 const EnumNames<ArrayMode> ARRAY_MODES{{"r16 coherent", ArrayMode::coherent_packets},
                                        {"r16 incoherent", ArrayMode::incoherent_packets},
                                        {"1M incoherent", ArrayMode::single_rays}};
 
-ArrayMode array_mode_from(const std::string &name) {
-    for (const auto &[known, mode] : ARRAY_MODES)
-        if (name == known)
+template <typename Mode>
+Mode mode_from(const EnumNames<Mode> &modes, const std::string &name) {
+    std::string known;
+    for (const auto &[each, mode] : modes) {
+        if (name == each)
             return mode;
-    refuse_value("mode must be r16 coherent, r16 incoherent or 1M incoherent.");
+        known += (known.empty() ? "" : ", ") + std::string(each);
+    }
+    refuse_value("mode must be one of " + known + ".");
 }
 
 Mesh mesh_from(const Points &vertices, const Faces &faces) {
@@ -294,7 +291,7 @@ void bind_embree(nb::module_ &m) {
                     primitives.shape(0) != count)
                     refuse_value("origins, directions, t and primitives must have the same "
                                  "length.");
-                const ArrayMode chosen = array_mode_from(mode);
+                const ArrayMode chosen = mode_from(ARRAY_MODES, mode);
                 nb::gil_scoped_release release;
                 closest_hits(self, origins.data(), directions.data(), count, chosen,
                              t.data(), primitives.data());
@@ -302,8 +299,7 @@ void bind_embree(nb::module_ &m) {
             nb::arg("origins"), nb::arg("directions"), nb::arg("t"), nb::arg("primitives"),
             nb::arg("mode") = "r16 incoherent",
             "Writes the nearest hits of rays, in one of the modes r16 coherent, r16 "
-            "incoherent "
-            "and 1M incoherent.")
+            "incoherent and 1M incoherent.")
         .def_prop_ro("seconds", [](const EmbreeScene &self) { return self.seconds(); })
         .def_prop_ro("bytes", &EmbreeScene::bytes)
         .def_prop_ro("peak_bytes", &EmbreeScene::peak_bytes)
@@ -312,7 +308,7 @@ void bind_embree(nb::module_ &m) {
             [](const EmbreeScene &self, const View &view, const Image &image,
                const std::optional<Primitives> &primitives, const std::optional<Bytes> &lit,
                const std::string &mode_name, uint32_t tile, bool shadows) {
-                const EmbreeMode mode = embree_mode_from(mode_name);
+                const EmbreeMode mode = mode_from(EMBREE_MODES, mode_name);
                 const FrameSettings settings = settings_from(tile, shadows);
                 const FrameOutput output = output_from(view, image, primitives, lit);
                 nb::gil_scoped_release release;

@@ -1,5 +1,5 @@
-// The vocabulary of vector code. Only this folder knows Dr.Jit and the width of a register;
-// this file is the core of it.
+// The vocabulary of vector code. In the core, only this folder names Dr.Jit and what a
+// processor has instructions for; this file is the core of it.
 //
 // A packet is 16 lanes on every processor; narrower instruction sets run it in two or four
 // parts. Arithmetic is plain IEEE: the same operations in the same order give the same bits

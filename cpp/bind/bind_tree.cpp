@@ -130,8 +130,7 @@ void bind_tree(nb::module_ &m) {
         .def("closest_hit", &closest_hit, nb::arg("origins"), nb::arg("directions"),
              nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),
              nb::arg("counters") = nb::none(),
-             "t float32, primitive int32 (-1 for a miss), u and v float32, each "
-             "(N,). What "
+             "t float32, primitive int32 (-1 for a miss), u and v float32, each (N,). What "
              "was counted takes its place in the dictionary `counters`.")
         .def("any_hit", &any_hit, nb::arg("origins"), nb::arg("directions"),
              nb::arg("t_min"), nb::arg("t_max"), nb::arg("options") = nb::dict(),

@@ -82,10 +82,8 @@ BeamPackets::FarthestEnds BeamPackets::load_packet(const RayGroup &rays, uint32_
         store_register(packet.greatest, lane, greatest);
         farthest.greatest =
             maximum(select(active, greatest, Lanes(0.0f)), farthest.greatest);
-        const Lanes begin =
-            maximum(t_min, Lanes(SMALLEST_DISTANCE)) * main * (1 + WIDEN_DEPTH) +
-            LEAST_DEPTH;
-        farthest.begin = maximum(select(active, begin, Lanes(0.0f)), farthest.begin);
+        farthest.begin = maximum(
+            select(active, first_certain_depth(t_min, main), Lanes(0.0f)), farthest.begin);
     });
     packet.primitive = UIntPacket(NO_PRIMITIVE);
     of_rays.active = all_active;

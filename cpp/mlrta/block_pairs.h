@@ -39,7 +39,7 @@ public:
     std::span<const uint32_t> all() const { return {pairs_.data(), count_}; }
 
 private:
-    // What is written comes in whole packets.
+    // What is written comes in whole registers.
     std::array<uint32_t, BeamPackets::RUNS * WIDE_WIDTH + WIDE_WIDTH> pairs_;
     uint32_t count_ = 0;
 };

@@ -180,7 +180,7 @@ HitDistances::Planes<FloatWide> HitDistances::planes_of(const UIntPacket &primit
         // From both ends, since there are few triangles, and one takes long to be told from
         // the next.
         const auto put = [&](uint32_t primitive, LaneBits holders) {
-            const float *const row = plane_of(primitive).normal;
+            const auto *const row = reinterpret_cast<const float *>(&plane_of(primitive));
             const auto mask = from_bits<FloatWide>(holders);
             for (size_t n = 0; n < columns.size(); ++n)
                 columns[n] = select(mask, FloatWide(row[n]), columns[n]);
@@ -197,7 +197,8 @@ HitDistances::Planes<FloatWide> HitDistances::planes_of(const UIntPacket &primit
     } else {
         std::array<const float *, WIDE_WIDTH> rows;
         for (uint32_t n = 0; n < WIDE_WIDTH; ++n)
-            rows[n] = planes_[lane_of(primitives, lane + n) % SIZE].normal;
+            rows[n] = reinterpret_cast<const float *>(
+                &planes_[lane_of(primitives, lane + n) % SIZE]);
         columns = load_columns(rows);
     }
     return {{columns[0], columns[1], columns[2]},

@@ -69,8 +69,8 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
     const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
                        SMALLEST_DEPTH;
-    // That takes no more of a triangle than that its vertices are moderate: of most others
-    // nothing else need be known.
+    // The box is right for all triangles whose vertices are moderate. A block that misses
+    // with all of them needs nothing else, though some may be degenerate.
     const MaskOf<Real> misses = put_box(rectangle, box, slack, ahead);
     possible = unsafe = 0;
     if ((given & ~to_bits(misses & safe)) == 0)

@@ -24,8 +24,8 @@ inline constexpr float SMALLEST_DISTANCE = 0x1p-60f;
 inline constexpr float UNKNOWN_DISTANCE = -1;
 
 // Of rays with a t_min and t_max, scalars or packets: hits less deep than the first are
-// certainly not past t_min, though the surface that a ray starts on is met there; those
-// deeper than the second are; and an end at t_max has a depth between the others.
+// certainly not past t_min, as is the surface that a ray starts on; those deeper than the
+// second are past it; and an end at t_max has a depth between the others.
 template <typename Real>
 Real last_depth_before(const Real &t_min, const Real &size) {
     return maximum(t_min * size * (1 - WIDEN_DEPTH) - LEAST_DEPTH, Real(0.0f));
@@ -59,7 +59,7 @@ struct DepthHit {
 };
 
 // By the contract of triangle_test.h: makes a triangle the best hit, if it is; returns
-// whether it is one. It is a copy of number `primitive`, and it may be known that the ray
+// whether it did. It is a copy of number `primitive`, and it may be known that the ray
 // goes through it.
 bool decide_best(const DepthRay &ray, const Triangle &triangle, uint32_t primitive,
                  bool certainly_hit, const Triangle *triangles, DepthHit &best,

@@ -1,6 +1,7 @@
 // From the arrays of a group to packets.
 #pragma once
 
+#include "base/check.h"
 #include "base/partial_packets.h"
 #include "geometry/ray_packet.h"
 #include "traverse/ray_group.h"
@@ -19,13 +20,14 @@ struct LoadedPacket {
     LaneBits extreme = 0;
 };
 
-// As many values as there are lanes from `first` on, which may lie past `count`; what does
-// reads as zero.
+// As many values as there are lanes from `first` on; those past `count` read as zero. For
+// packets of one register among several, `first` may lie past it too.
 template <typename Packet = FloatPacket>
 [[gnu::always_inline]] inline Packet load_padded(const float *values, uint32_t first,
                                                  uint32_t count) {
     if (first + LANES_OF<Packet> <= count)
         return load<Packet>(values + first);
+    MLRT_CHECK(first < count || LANES_OF<Packet> < PACKET_WIDTH);
     return load_first<Packet>(values + first, count - first);
 }
 

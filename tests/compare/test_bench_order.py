@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bench_command import assert_one_sentence, command
+from mlrt_compare.bench.contenders import QUALITIES
 from mlrt_compare.bench.native import Native
-from mlrt_compare.bench.order import contenders, nanoseconds, orders_of
+from mlrt_compare.bench.order import ARRAY_MODES, contenders, nanoseconds, orders_of
 from mlrt_compare.bench.scenes import BenchScene
 
 SIDE = 32
+CONTENDERS = 1 + len(QUALITIES) * len(ARRAY_MODES)
 
 
 def test_orders_hold_the_same_rays(native: Native, office: BenchScene) -> None:
@@ -35,7 +37,7 @@ def test_orders_hold_the_same_rays(native: Native, office: BenchScene) -> None:
 
 def test_embree_finds_what_mlrt_does(native: Native, office: BenchScene) -> None:
     tracers = contenders(native, office, 1)
-    assert len(tracers) == 5
+    assert len(tracers) == CONTENDERS
     for origins, directions in orders_of(office, SIDE, tracers["MLRT"]).values():
         t, face = tracers["MLRT"](origins, directions)
         for trace in tracers.values():
@@ -83,7 +85,7 @@ def test_the_command_tells_and_keeps_it(
     ]
     for row in block["rows"]:
         assert row["order"] in child.stdout
-        assert len(row["contenders"]) == 5 and row["nanoseconds"]["MLRT"] > 0
+        assert len(row["contenders"]) == CONTENDERS and row["nanoseconds"]["MLRT"] > 0
 
 
 def test_what_cannot_run_is_one_sentence(native: Native, cache: Path) -> None:

@@ -43,8 +43,9 @@ def _random_box(rng: np.random.Generator, size: float) -> Doubles:
 
 def _assert_as_brute_force(
     tree: object, rays: Rays, t_min: npt.ArrayLike, t_max: npt.ArrayLike
-) -> tuple[float, dict[str, int]]:
-    """Returns which share of the rays is occluded, and counters of beam_leaf."""
+) -> tuple[float, dict[str, int], dict[str, int]]:
+    """Returns which share of the rays is occluded, and counters of beam_leaf and of
+    adaptive."""
     expected = occluded(tree, rays, BRUTE_FORCE, t_min=t_min, t_max=t_max)
     counters: dict[str, dict[str, int]] = {}
     for options in (BEAM_LEAF, ADAPTIVE):
@@ -56,7 +57,7 @@ def _assert_as_brute_force(
         )
         different = np.flatnonzero(np.asarray(found, bool) != expected)
         assert different.size == 0, (options, different[:4], SEED)
-    return float(expected.mean()), counters["beam_leaf"]
+    return float(expected.mean()), counters["beam_leaf"], counters["adaptive"]
 
 
 @each_core
@@ -65,7 +66,8 @@ def test_rays_between_boxes_are_stopped_as_by_brute_force(
     core: ModuleType, triangles: int
 ) -> None:
     rng = np.random.default_rng(SEED + triangles)
-    shares, beams, given_up = [], 0, 0
+    shares = []
+    beams, given_up = np.zeros(2, int), np.zeros(2, int)
     for _ in range(25):
         tree = build(core, workloads.soup(rng, triangles, rng.choice([0.1, 0.5, 2])))
         size = rng.choice([0.01, 0.1, 1])
@@ -74,13 +76,13 @@ def test_rays_between_boxes_are_stopped_as_by_brute_force(
         rays = _between(_in_box(rng, count, begin), _in_box(rng, count, end))
         t_min = rng.choice(np.array([0, 0, 0.2, -1], np.float32), count)
         t_max = rng.choice(np.array([1, 1, 0.3, 0, -1, np.nan], np.float32), count)
-        share, counters = _assert_as_brute_force(tree, rays, t_min, t_max)
+        share, *counters = _assert_as_brute_force(tree, rays, t_min, t_max)
         shares.append(share)
-        beams += counters["beams"]
-        given_up += counters["fallbacks"]
+        beams += [each["beams"] for each in counters]
+        given_up += [each["fallbacks"] for each in counters]
     assert 0 < np.mean(shares) < 1, SEED
-    assert beams > 0, SEED
-    assert (given_up > 0) == (triangles > 30), SEED
+    assert np.all(beams > 0), SEED
+    assert np.all((given_up > 0) == (triangles > 30)), SEED
 
 
 @each_core
@@ -89,7 +91,8 @@ def test_triangles_that_touch_the_hull(core: ModuleType, offset: float) -> None:
     """Each triangle touches a line from a corner of one box to a corner of the other, and
     lies beyond the hull else, so that it stops rays along this line alone."""
     rng = np.random.default_rng(SEED)
-    stopped = beams = 0
+    stopped = 0
+    beams = np.zeros(2, int)
     for _ in range(150):
         begin, end = _random_box(rng, 0.5), _random_box(rng, 0.5)
         corners = [box[0] + CORNERS * (box[1] - box[0]) for box in (begin, end)]
@@ -115,10 +118,10 @@ def test_triangles_that_touch_the_hull(core: ModuleType, offset: float) -> None:
         own = np.repeat([[start, stop]], 16, axis=0)
         pairs = np.concatenate([pairs, own]) + offset
         rays = _between(pairs[:, 0], pairs[:, 1])
-        share, counters = _assert_as_brute_force(tree, rays, 0, 1)
+        share, *counters = _assert_as_brute_force(tree, rays, 0, 1)
         stopped += share > 0
-        beams += counters["beams"]
-    assert stopped > 100 and beams > 100, SEED
+        beams += [each["beams"] for each in counters]
+    assert stopped > 100 and np.all(beams > 100), SEED
 
 
 @each_core
@@ -201,4 +204,4 @@ def test_no_ray_between_boxes_passes_a_closed_mesh(core: ModuleType) -> None:
         found = tree.any_hit(*rays, *interval(rays, 0, 1), BEAM_LEAF, counters)
         assert np.all(np.asarray(found, bool)), target
         beams += counters["beams"]
-    assert beams > 0
+    assert beams > 0 and counters["beams"] > 0
