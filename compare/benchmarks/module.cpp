@@ -43,12 +43,13 @@ const EnumNames<ArrayMode> ARRAY_MODES{{"r16 coherent", ArrayMode::coherent_pack
 template <typename Mode>
 Mode mode_from(const EnumNames<Mode> &modes, const std::string &name) {
     std::string known;
-    for (const auto &[each, mode] : modes) {
+    for (size_t i = 0; i < modes.size(); ++i) {
+        const auto &[each, mode] = modes[i];
         if (name == each)
             return mode;
-        known += (known.empty() ? "" : ", ") + std::string(each);
+        known += (i == 0 ? "" : i + 1 < modes.size() ? ", " : " or ") + std::string(each);
     }
-    refuse_value("mode must be one of " + known + ".");
+    refuse_value("mode must be " + known + ".");
 }
 
 Mesh mesh_from(const Points &vertices, const Faces &faces) {
