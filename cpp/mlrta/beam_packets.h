@@ -201,7 +201,8 @@ private:
     struct FarthestEnds {
         Lanes begin = 0.0f, greatest = 0.0f;
     };
-    FarthestEnds load_packet(const RayGroup &rays, uint32_t last, uint32_t number);
+    [[gnu::always_inline]] inline FarthestEnds load_packet(const RayGroup &rays,
+                                                           uint32_t last, uint32_t number);
     FloatPacket load_parallel_packet(const RayGroup &rays, uint32_t last, uint32_t number,
                                      FloatPacket &reach);
     void settle_packet(const RayGroup &rays, uint32_t number);
