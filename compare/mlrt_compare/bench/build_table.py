@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from .goals import counted_runs, seconds
+from .goals import best_of, counted_runs, median_of
 from .measure import best
-from .table import aligned, machine_lines, megabytes, number, plural, spread
+from .speedup import MEDIANS
+from .table import aligned, machine_lines, megabytes, number, plural
 
 COLUMNS = (
     *("", "build s", "CPU s", "frame s", "CPU s", "build + frame s", "runs"),
@@ -19,8 +20,8 @@ def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
         *machine_lines(machine),
         f"frame: {settings['resolution']} x {settings['resolution']}, a primary ray a "
         "pixel and a shadow ray a hit; seconds: best (median) of the runs that others left "
-        "alone, which are counted of all runs; wide: the form of the tree for rays that go "
-        "alone, made after it",
+        f"alone, which are counted of all runs; {MEDIANS}; wide: the "
+        "form of the tree for rays that go alone, made after it",
     ]
 
 
@@ -39,11 +40,11 @@ def contender_row(contender: dict[str, Any], scene: dict[str, Any]) -> tuple[str
     steps = scene["ats"].get(contender["name"], {})
     return (
         contender["name"],
-        spread(seconds(contender, ("build",))),
+        spread(contender, ("build",)),
         number(best(run["build"]["cpu"] for run in runs)),
-        spread(seconds(contender, ("frame",))),
+        spread(contender, ("frame",)),
         number(best(run["frame"]["cpu"] for run in runs)),
-        spread(seconds(contender, ("build", "frame"))),
+        spread(contender, ("build", "frame")),
         f"{sum(not run['busy'] for run in runs)}/{len(contender['runs'])}",
         megabytes(contender["bytes"]),
         f"{contender['bytes'] / max(scene['triangles'], 1):.1f}",
@@ -55,11 +56,17 @@ def contender_row(contender: dict[str, Any], scene: dict[str, Any]) -> tuple[str
     )
 
 
+def spread(contender: dict[str, Any], parts: tuple[str, ...]) -> str:
+    """The best and the median of the seconds of parts of a run."""
+    figures = (figure(contender, parts, "wall") for figure in (best_of, median_of))
+    return "{} ({})".format(*map(number, figures))
+
+
 def wide_cells(contender: dict[str, Any]) -> tuple[str, str]:
     """Seconds and bytes of the form for rays that go alone, where it was made."""
     if "wide_bytes" not in contender:
         return "-", "-"
-    return spread(seconds(contender, ("wide",))), megabytes(contender["wide_bytes"])
+    return spread(contender, ("wide",)), megabytes(contender["wide_bytes"])
 
 
 def scene_lines(scene: dict[str, Any]) -> list[str]:

@@ -11,20 +11,24 @@ import importlib.util
 import os
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from .errors import BenchError
 from .options import (
     Parser,
+    add_json_option,
     add_sample_counts,
     add_shared_options,
+    add_source_option,
     add_study_options,
+    check_cache,
     check_folder_of,
+    check_images,
     check_json,
     check_plot,
     check_threads,
     count,
     names,
+    path,
     settings_of_tracing,
     sizes,
 )
@@ -43,6 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_json(options.json)
         threads = options.threads
         check_threads([threads] if isinstance(threads, int) else threads)
+        check_cache(getattr(options, "cache", None))
         return DONE if run(options) else DISAGREE
     except BenchError as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
@@ -54,6 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except Exception as error:
         if os.environ.get("MLRT_DEBUG"):
             raise
+        if isinstance(error, ImportError) and str(error).startswith("MLRT_ISA="):
+            print(f"{PROGRAM}: {error}", file=sys.stderr)
+            return COULD_NOT_RUN
         message = " ".join(str(error).split())
         print(f"{PROGRAM}: {type(error).__name__}: {message}", file=sys.stderr)
         return COULD_NOT_RUN
@@ -76,7 +84,7 @@ def make_parser() -> Parser:
     build.set_defaults(run=run_build)
     add_shared_options(build, repeats=5)
     build.add_argument(
-        "--images", type=Path, metavar="DIR", help="write the frames of both engines there"
+        "--images", type=path, metavar="DIR", help="write the frames of both engines there"
     )
     rays = commands.add_parser(
         "rays",
@@ -117,11 +125,23 @@ def make_parser() -> Parser:
         "frames",
         help="whole frames by MLRT and by Mitsuba's llvm variant",
         description="Renders the same image with MLRT and with the integrator direct of "
-        "Mitsuba's llvm_ad_rgb, from the loaded scene to the finished film.",
+        "Mitsuba's llvm_ad_rgb, from the loaded scene to the finished film. Frames are "
+        "those after the tree has got its form for rays that go alone, whose making is "
+        "told apart.",
     )
     frames.set_defaults(run=run_frames)
     add_shared_options(frames, repeats=7, scenes="office,conference")
     add_sample_counts(frames)
+    ats = commands.add_parser(
+        "ats",
+        help="traversal steps without and with entry points",
+        description="Counts the steps of primary rays through the tree, alone and in "
+        "packets from the root, and from one entry point a tile and from up to eight. No "
+        "times are taken.",
+    )
+    ats.set_defaults(run=run_ats)
+    add_shared_options(ats, repeats=1, scenes="office,conference,building,dragon-7.2M")
+    ats.add_argument("--markdown", type=path, metavar="FILE", help="write all tables there")
     tiles = commands.add_parser(
         "tiles",
         help="frames with tiles of other sizes",
@@ -223,10 +243,10 @@ def make_parser() -> Parser:
         help="of the meshes, 1 to 10: 8 * 4**N faces (%(default)s)",
     )
     kernels.add_argument(
-        "--markdown", type=Path, metavar="FILE", help="write all tables there"
+        "--markdown", type=path, metavar="FILE", help="write all tables there"
     )
     kernels.add_argument(
-        "--plot", type=Path, metavar="FILE", help="draw speed against errors there"
+        "--plot", type=path, metavar="FILE", help="draw speed against errors there"
     )
     offsets = commands.add_parser(
         "offsets",
@@ -237,11 +257,9 @@ def make_parser() -> Parser:
         "times are taken.",
     )
     offsets.set_defaults(run=run_offsets, threads=(1,))
+    add_json_option(offsets)
     offsets.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all figures there"
-    )
-    offsets.add_argument(
-        "--images", type=Path, metavar="DIR", help="write images with marks on such pixels"
+        "--images", type=path, metavar="DIR", help="write images with marks on such pixels"
     )
     offsets.add_argument(
         "--resolution",
@@ -250,12 +268,7 @@ def make_parser() -> Parser:
         metavar="N",
         help="pixels along both sides of the image (%(default)s)",
     )
-    offsets.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(offsets)
     readme = commands.add_parser(
         "readme",
         help="the results that README.md shows, from the figures that are kept",
@@ -268,12 +281,7 @@ def make_parser() -> Parser:
         action="store_true",
         help="write nothing; the exit code is 2 if anything is not what the figures say",
     )
-    readme.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(readme)
     return parser
 
 
@@ -289,10 +297,7 @@ def ray_count(text: str) -> int:
 
 
 def run_build(options: argparse.Namespace) -> bool:
-    if options.images is not None:
-        check_folder_of(options.images)
-        if options.images.is_file():
-            raise BenchError(f"{options.images} to write images to is not a folder")
+    check_images(options.images)
     from .build_command import run
 
     return run(options)
@@ -300,6 +305,14 @@ def run_build(options: argparse.Namespace) -> bool:
 
 def run_rays(options: argparse.Namespace) -> bool:
     from .rays_command import run
+
+    return run(options)
+
+
+def run_ats(options: argparse.Namespace) -> bool:
+    if options.markdown is not None:
+        check_folder_of(options.markdown)
+    from .ats_command import run
 
     return run(options)
 
@@ -352,10 +365,7 @@ def run_kernels(options: argparse.Namespace) -> bool:
 
 
 def run_offsets(options: argparse.Namespace) -> bool:
-    if options.images is not None:
-        check_folder_of(options.images)
-        if options.images.is_file():
-            raise BenchError(f"{options.images} to write images to is not a folder")
+    check_images(options.images)
     from .offsets_command import run
 
     return run(options)

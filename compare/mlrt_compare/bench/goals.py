@@ -10,6 +10,13 @@ from .measure import best, median
 
 LAZY_SCENES = ("building", "dragon")
 """Large ones, where a tree that is built where rays go is to pay."""
+MOST_CPU = 1.3
+"""Times the least CPU time of runs of the same; runs with more are taken for disturbed and
+say nothing about a median. Chosen: of undisturbed ones almost all differ by less."""
+LEAST_RUNS = 3
+"""That a median is taken of before any is left out for its CPU time; chosen."""
+Figure = Callable[[dict[str, Any], tuple[str, ...], str], float]
+"""Of a contender: seconds of parts of its runs by a clock, wall or cpu."""
 Block = dict[str, Any]
 """Figures of one number of threads, as `mlrt-bench build` writes them."""
 
@@ -48,9 +55,28 @@ def counted_runs(contender: dict[str, Any]) -> list[dict[str, Any]]:
     return [run for run in runs if not run["busy"]] or runs
 
 
-def seconds(contender: dict[str, Any], parts: tuple[str, ...]) -> list[float]:
-    """Wall-clock seconds of each run that counts."""
-    return [sum(run[part]["wall"] for part in parts) for run in counted_runs(contender)]
+def undisturbed_runs(
+    contender: dict[str, Any], parts: tuple[str, ...]
+) -> list[dict[str, Any]]:
+    """Of the runs that count, those of which medians are taken: without such that took much
+    more CPU time than the best, as work does whose caches others use, whoever had the
+    processor; all if too few were left. Of every contender alike."""
+    runs = counted_runs(contender)
+    cpu = [sum(run[part]["cpu"] for part in parts) for run in runs]
+    limit = MOST_CPU * min(cpu)
+    left = [run for run, took in zip(runs, cpu, strict=True) if took <= limit]
+    return left if len(left) >= LEAST_RUNS else runs
+
+
+def best_of(contender: dict[str, Any], parts: tuple[str, ...], clock: str) -> float:
+    """Seconds of the parts of a run together; clock: wall or cpu."""
+    runs = counted_runs(contender)
+    return best(sum(run[part][clock] for part in parts) for run in runs)
+
+
+def median_of(contender: dict[str, Any], parts: tuple[str, ...], clock: str) -> float:
+    runs = undisturbed_runs(contender, parts)
+    return median(sum(run[part][clock] for part in parts) for run in runs)
 
 
 def goals_of(scene: str, block: Block, sah_costs: dict[str, float]) -> Iterator[Goal]:
@@ -70,10 +96,10 @@ def goals_of(scene: str, block: Block, sah_costs: dict[str, float]) -> Iterator[
         parts: tuple[str, ...],
         is_set: bool = True,
     ) -> Goal:
-        def ratio(pick: Callable[[list[float]], float]) -> float:
-            return pick(seconds(own, parts)) / pick(seconds(other, parts))
+        def ratio(figure: Figure) -> float:
+            return figure(own, parts, "wall") / figure(other, parts, "wall")
 
-        return Goal(name, ratio(best), ratio(median), limit, is_set)
+        return Goal(name, ratio(best_of), ratio(median_of), limit, is_set)
 
     def of_numbers(name: str, limit: float, own: float, other: float) -> Goal:
         return Goal(name, own / other, own / other, limit)

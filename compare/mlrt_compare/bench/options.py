@@ -14,6 +14,13 @@ PLOTS = (".png", ".svg", ".pdf")
 """Kinds of images that plots are written as."""
 
 
+def path(text: str) -> Path:
+    """Of an option; nothing names no file, though Path takes it for the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("an empty name is given: name a file or a folder")
+    return Path(text)
+
+
 class Parser(argparse.ArgumentParser):
     """Reports a wrong call in one sentence, with the exit code for what could not run."""
 
@@ -25,9 +32,7 @@ def add_shared_options(
     command: argparse.ArgumentParser, *, repeats: int, scenes: str = "all usual ones"
 ) -> None:
     """Those that every command has. ``repeats``, ``scenes``: the usual ones."""
-    command.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all figures there"
-    )
+    add_json_option(command)
     command.add_argument(
         "--scenes",
         type=names,
@@ -57,23 +62,16 @@ def add_shared_options(
     )
     command.add_argument(
         "--cache",
-        type=Path,
+        type=path,
         metavar="DIR",
         help="folder for generated scenes and the native side (~/.cache/mlrt-bench)",
     )
-    command.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(command)
 
 
 def add_study_options(command: argparse.ArgumentParser, *, rays: int) -> None:
     """Those of studies of hits. ``rays``: the usual number of them."""
-    command.add_argument(
-        "--json", type=Path, metavar="FILE", help="write all figures there"
-    )
+    add_json_option(command)
     command.add_argument(
         "--rays",
         type=ray_count,
@@ -88,11 +86,21 @@ def add_study_options(command: argparse.ArgumentParser, *, rays: int) -> None:
         "--threads", type=count, default=os.cpu_count() or 1, metavar="N", help="(all)"
     )
     command.add_argument(
-        "--cache", type=Path, metavar="DIR", help="folder for the native side"
+        "--cache", type=path, metavar="DIR", help="folder for the native side"
     )
+    add_source_option(command)
+
+
+def add_json_option(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--json", type=path, metavar="FILE", help="write all figures there"
+    )
+
+
+def add_source_option(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--source",
-        type=Path,
+        type=path,
         metavar="DIR",
         help="MLRT's source checkout (the current one)",
     )
@@ -117,12 +125,35 @@ def check_json(path: Path | None) -> None:
     check_folder_of(path)
 
 
+def check_cache(path: Path | None) -> None:
+    """Makes the folder; raises BenchError if what is compiled cannot be kept there."""
+    if path is None:
+        return
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BenchError(
+            f"the folder {path} for --cache cannot be made ({error.strerror}): name another"
+        ) from error
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise BenchError(f"there is no permission to write to --cache {path}: name another")
+
+
 def check_folder_of(path: Path) -> None:
     folder = path.absolute().parent
     if not folder.is_dir():
         raise BenchError(f"there is no folder {path.parent} to write {path} to")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise BenchError(f"there is no permission to write {path}: name another folder")
+
+
+def check_images(folder: Path | None) -> None:
+    """Raises BenchError for a folder that could not be made or written to."""
+    if folder is None:
+        return
+    check_folder_of(folder)
+    if folder.is_file():
+        raise BenchError(f"{folder} to write images to is not a folder")
 
 
 def check_plot(path: Path) -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from .contenders import EMBREE, MLRT
-from .measure import best, median
 from .rays_contenders import INEXACT, WATERTIGHT
-from .speedup import Speedup, frame_seconds, speedup
+from .speedup import Speedup, best_frame, median_frame, speedup
 
 Work = tuple[int, bool]
 """Samples a pixel, and whether there are shadow rays."""
@@ -59,11 +58,11 @@ def cost_beside_inexact(block: dict[str, Any], name: str) -> dict[str, float] | 
     if own is None or inexact is None:
         return None
     return {
-        name: pick(frame_seconds(own, clock)) / pick(frame_seconds(inexact, clock))
-        for name, pick, clock in (
-            ("best", best, "wall"),
-            ("median", median, "wall"),
-            ("cpu", best, "cpu"),
+        name: figure(own, clock) / figure(inexact, clock)
+        for name, figure, clock in (
+            ("best", best_frame, "wall"),
+            ("median", median_frame, "wall"),
+            ("cpu", best_frame, "cpu"),
         )
     }
 
@@ -74,4 +73,4 @@ def peers_of(block: dict[str, Any]) -> list[dict[str, Any]]:
 
 def fastest_peer(block: dict[str, Any]) -> dict[str, Any]:
     """The contender of Embree with the best frame on the clock."""
-    return min(peers_of(block), key=lambda peer: best(frame_seconds(peer, "wall")))
+    return min(peers_of(block), key=best_frame)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .measure import best, median
+from .ats_table import entry_points, plural_steps, verdict
 from .rays_goals import fastest_peer
-from .speedup import aims_text, frame_seconds, ratio_lines, ratio_text
+from .speedup import MEDIANS, aims_text, best_frame, median_frame, ratio_lines, ratio_text
 from .table import aligned, machine_lines, number, plural
 
 COLUMNS = (
@@ -25,8 +25,8 @@ def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
     return [
         *machine_lines(machine),
         f"frame: {side} x {side}; rays made, traced, shaded and stored; best of the runs "
-        "that others left alone, which are counted of all runs; tile: rays along the side "
-        "of what is handed over at once, the best of "
+        f"that others left alone, which are counted of all runs; {MEDIANS}; "
+        "tile: rays along the side of what is handed over at once, the best of "
         f"{', '.join(map(str, settings['tiles']))}",
         *([f"Embree is limited to {machine['isa']}"] if settings["same_isa"] else []),
         "differs: rays for which MLRT and Embree differ in hit or miss, in the triangle, "
@@ -43,7 +43,7 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
     rays = sum(block["rays"].values())
     rows: list[tuple[str, ...]] = [COLUMNS]
     for contender in block["contenders"]:
-        wall = frame_seconds(contender, "wall")
+        wall = best_frame(contender)
         differing = contender["differing"]
         runs = contender["runs"]
         rows.append(
@@ -51,10 +51,10 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
                 contender["name"],
                 contender["call"],
                 str(contender["tile"]),
-                number(1e3 * best(wall)),
-                number(1e3 * median(wall)),
-                number(1e3 * best(frame_seconds(contender, "cpu"))),
-                number(1e-6 * rays / best(wall)),
+                number(1e3 * wall),
+                number(1e3 * median_frame(contender)),
+                number(1e3 * best_frame(contender, "cpu")),
+                number(1e-6 * rays / wall),
                 f"{sum(not run['busy'] for run in runs)}/{len(runs)}",
                 *(str(differing[key]) for key in ("hit", "triangle", "lit")),
             )
@@ -85,16 +85,22 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
 def step_lines(scene: dict[str, Any]) -> list[str]:
     """ATS of the three baselines of a scene."""
     ats = scene["ats"]
-    line = (
-        f"  steps for 16 rays: single rays from the root "
+    lines = [
+        "  steps for 16 rays: single rays from the root "
         f"{number(ats['single_rays_from_the_root'])}, packets from the root "
-        f"{number(ats['packets_from_the_root'])}, with entry points "
-        f"{number(ats['with_entry_points'])}: {ats['reduction']:.2f} times fewer"
-    )
-    if ats["goal"] is not None:
-        met = "met" if ats["reduction"] >= ats["goal"] else "missed"
-        line += f", goal {ats['goal']:g} {met}"
-    return [line]
+        f"{number(ats['packets_from_the_root'])}"
+    ]
+    for row in ats["with_entry_points"]:
+        for counted in row["counted"]:
+            cells = plural_steps(counted["cell_steps"])
+            line = (
+                f"  {entry_points(row)}, a cell {cells}: {number(counted['steps'])}, "
+                f"{counted['reduction']:.2f} times fewer"
+            )
+            if ats["goal"] is not None:
+                line += f", goal {ats['goal']:g} {verdict(counted)}"
+            lines.append(line)
+    return lines
 
 
 def goal_lines(scenes: list[dict[str, Any]]) -> list[str]:

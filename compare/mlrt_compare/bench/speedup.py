@@ -6,11 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from .goals import counted_runs, judged
-from .measure import best, median
+from .goals import LEAST_RUNS, MOST_CPU, best_of, counted_runs, judged, median_of
 from .table import aligned, plural
 
-Pick = Callable[[list[float]], float]
+MEDIANS = (
+    f"medians without those of more than {MOST_CPU:g} times the least CPU time, as long as "
+    f"{LEAST_RUNS} are left"
+)
+"""Of which runs they are, for tables."""
+FrameFigure = Callable[[dict[str, Any], str], float]
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,15 @@ def frame_seconds(contender: dict[str, Any], clock: str) -> list[float]:
     return [run["frame"][clock] for run in counted_runs(contender)]
 
 
+def best_frame(contender: dict[str, Any], clock: str = "wall") -> float:
+    """Seconds of a frame in the best run that counts; ``clock`` is wall or cpu."""
+    return best_of(contender, ("frame",), clock)
+
+
+def median_frame(contender: dict[str, Any], clock: str = "wall") -> float:
+    return median_of(contender, ("frame",), clock)
+
+
 def speedup(
     own: dict[str, Any],
     peers: Sequence[dict[str, Any]],
@@ -59,14 +72,13 @@ def speedup(
 ) -> Speedup:
     """Of a contender beside whichever of its peers is the fastest, by each figure."""
 
-    def ratio(pick: Pick, clock: str) -> float:
-        fastest = min(pick(frame_seconds(peer, clock)) for peer in peers)
-        return fastest / pick(frame_seconds(own, clock))
+    def ratio(figure: FrameFigure, clock: str) -> float:
+        return min(figure(peer, clock) for peer in peers) / figure(own, clock)
 
     return Speedup(
-        best=ratio(best, "wall"),
-        median=ratio(median, "wall"),
-        cpu=ratio(best, "cpu"),
+        best=ratio(best_frame, "wall"),
+        median=ratio(median_frame, "wall"),
+        cpu=ratio(best_frame, "cpu"),
         goal=goal,
         stretch=stretch,
     )

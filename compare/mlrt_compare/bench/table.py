@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from .measure import best, median
-
 
 def machine_lines(machine: dict[str, Any]) -> list[str]:
     facts = (
@@ -24,10 +22,6 @@ def machine_lines(machine: dict[str, Any]) -> list[str]:
 
 def plural(threads: int) -> str:
     return f"{threads} thread{'s' if threads != 1 else ''}"
-
-
-def spread(values: list[float]) -> str:
-    return f"{number(best(values))} ({number(median(values))})"
 
 
 def number(value: float | None) -> str:

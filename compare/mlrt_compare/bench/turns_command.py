@@ -11,12 +11,11 @@ from .commits import commit_named, sources_of
 from .figures import measure_scenes, new_figures, show
 from .frame_runs import FrameSettings
 from .machine import machine_record
-from .measure import best
 from .native import compiled_native
 from .options import default_cache
 from .rays_table import work
 from .scenes import BenchScene, chosen_scenes, scenes_of_rays
-from .speedup import frame_seconds
+from .speedup import best_frame
 from .table import aligned, machine_lines, number, plural
 from .turns import BASE, NEW, measure_turns
 
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace) -> bool:
 def scene_lines(scene: dict[str, Any]) -> list[str]:
     rows: list[tuple[str, ...]] = [COLUMNS]
     for block in scene["blocks"]:
-        new, base = (best(frame_seconds(each, "wall")) for each in block["contenders"])
+        new, base = (best_frame(each) for each in block["contenders"])
         ratios, differing = block["speedup"], block["differing"]
         rows.append(
             (
