@@ -17,11 +17,12 @@ from .ats import baselines
 from .build import BACKGROUND, LARGEST_DIFFERENCE
 from .contenders import QUALITIES, embree_device
 from .frame_runs import FrameRun, FrameSettings, measured_in_turns, timed_frames
-from .measure import Timing, best
+from .measure import Timing
 from .native import Native
 from .rays_contenders import (
     RayContender,
     Variant,
+    choose_variant,
     less_exact_contender,
     ray_contenders,
 )
@@ -36,9 +37,6 @@ data in the caches; chosen."""
 ENOUGH_SECONDS = 6.0
 """A contender whose frames took longer than that in all is not run again, once it has run
 twice; chosen, for millions of triangles and 16 samples a pixel."""
-TUNING_SECONDS, TUNING_FRAMES = 0.3, 5
-"""A variant is tried until it has had either; chosen."""
-
 
 GRIDS = {1: 1, 16: 4}
 """Rays along both sides of a pixel, by samples."""
@@ -172,23 +170,9 @@ class RayBenchmark:
         at work disturb least."""
         for contender in contenders:
             show_status(f"{self._scene.name}: choosing tiles of {contender.name}")
-            least: dict[Variant, float] = {}
-            for variant in contender.variants:
-                frames: list[Timing] = []
-                while len(frames) < TUNING_FRAMES and (
-                    sum(frame.wall for frame in frames) < TUNING_SECONDS
-                ):
-                    frames.append(self._render(variant, view, shadows, 1))
-                least[variant] = best(frame.cpu for frame in frames)
-                contender.tuning.append(
-                    {
-                        "call": variant.call,
-                        "tile": variant.tile,
-                        "wall": best(frame.wall for frame in frames),
-                        "cpu": least[variant],
-                    }
-                )
-            contender.chosen = min(least, key=lambda variant: least[variant])
+            choose_variant(
+                contender, lambda variant: self._render(variant, view, shadows, 1)
+            )
 
     def _measure(
         self, contenders: list[RayContender], view: Any, shadows: bool, threads: int

@@ -8,12 +8,19 @@ from typing import Any
 
 from .contenders import EMBREE, MLRT, QUALITIES
 from .frame_runs import FrameRun
+from .measure import Timing, best
 
 INEXACT, WATERTIGHT = "inexact", "watertight"
 """Kinds of MLRT that trust single precision: in all, and in distances alone."""
 EMBREE_MODES = {"r16": ("r16",), "NM": ("NM8", "NM16"), "1M": ("1M",)}
 """Ways in which Embree takes many rays, by what the native side calls their variants:
 coherent packets of 16, coherent streams of packets of 8 or 16, incoherent streams."""
+TUNING_SECONDS, TUNING_FRAMES = 0.3, 5
+"""A variant is tried until it has had either; chosen."""
+LEAST_TUNING_FRAMES = 3
+"""That it is tried for however long they take, unless it is out of the question; chosen."""
+OUT_OF_THE_QUESTION = 1.5
+"""Times the least CPU time of the others, once each has had a frame; chosen."""
 Render = Callable[..., Any]
 """Of the view, the image and keywords; returns seconds."""
 
@@ -92,3 +99,43 @@ def less_exact_contender(
     """MLRT with a core of the given kind; tree and view are of its module."""
     variants = [mlrt_variant(tree, trace, tile, view) for tile in tiles]
     return RayContender(MLRT, kind, variants)
+
+
+def choose_variant(contender: RayContender, frame: Callable[[Variant], Timing]) -> None:
+    """Finds the variant of which a frame takes the least CPU time, and keeps the trials.
+
+    They are rendered in turns; one that is far behind after its first frame has no more.
+    """
+    trials: dict[Variant, list[Timing]] = {variant: [] for variant in contender.variants}
+
+    def least(variant: Variant) -> float:
+        return best(each.cpu for each in trials[variant])
+
+    left = list(contender.variants)
+    while left:
+        for variant in left:
+            trials[variant].append(frame(variant))
+        limit = OUT_OF_THE_QUESTION * min(map(least, trials))
+        left = [
+            variant
+            for variant in left
+            if needs_trial(trials[variant]) and least(variant) <= limit
+        ]
+    contender.chosen = min(trials, key=least)
+    contender.tuning += [
+        {
+            "call": variant.call,
+            "tile": variant.tile,
+            "wall": best(each.wall for each in frames),
+            "cpu": least(variant),
+            "frames": len(frames),
+        }
+        for variant, frames in trials.items()
+    ]
+
+
+def needs_trial(frames: Sequence[Timing]) -> bool:
+    if len(frames) < LEAST_TUNING_FRAMES:
+        return True
+    spent = sum(each.wall for each in frames)
+    return len(frames) < TUNING_FRAMES and spent < TUNING_SECONDS
