@@ -22,6 +22,7 @@ from mlrt_plugin.parsing import resolving_from
 
 from .errors import BenchError
 from .measure import in_turns, median
+from .widening import widen
 
 PLAIN = "none of them"
 MATERIAL = '<bsdf type="diffuse">{}</bsdf>'
@@ -100,15 +101,17 @@ def prepared_with(
     folder: Path,
     cube: tuple[Sequence[float], float],
 ) -> Any:
-    """A scene with a small cube of that place and size; raises BenchError if it cannot be
-    loaded."""
+    """A scene with a small cube of that place and size, and with the wide form of its tree;
+    raises BenchError if it cannot be loaded."""
     path = folder / scene.name
     path.write_text(with_shape(scene, *cube, content))
     try:
         with resolving_from(scene.parent.resolve()):
-            return prepare(path, resolution=(resolution, resolution))
+            prepared = prepare(path, resolution=(resolution, resolution))
     except MlrtError as error:
         raise BenchError(str(error)) from error
+    widen(prepared)
+    return prepared
 
 
 def measure_features(

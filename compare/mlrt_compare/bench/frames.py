@@ -1,5 +1,8 @@
 """mlrt-bench frames: whole frames by MLRT and by Mitsuba's llvm `direct`, the same image.
 
+Frames are those of a steady state: after the tree has got its form for rays that go alone,
+which MLRT makes on its own in one of the first frames. What that takes is told apart.
+
 ``llvm.activate`` comes before the import of this module.
 """
 
@@ -8,6 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,6 +29,7 @@ from .measure import Timing, waiting_seconds
 from .speedup import speedup
 from .status import show_status
 from .table import plural
+from .widening import widen
 
 GOALS: dict[int, dict[str, tuple[float, float]]] = {
     1: {"conference": (8.0, 15.0), "office": (12.0, 15.0)},
@@ -47,6 +52,14 @@ class Renderer(Protocol):
         """Renders a frame and returns the seconds that it took."""
 
 
+class WidenedMlrt(MlrtRenderer):
+    """MLRT with the wide form of its tree, where that has one."""
+
+    def __init__(self, settings: compare_settings.Settings) -> None:
+        super().__init__(settings)
+        self.widening = widen(self._prepared)
+
+
 class FrameBenchmark:
     """All measurements of one scene. Raises BenchError if a side cannot load it."""
 
@@ -58,12 +71,18 @@ class FrameBenchmark:
         show_status(f"{name}: loading")
         with thread_count(max(settings.threads)):
             try:
-                self._mlrt = MlrtRenderer(wanted)
+                self._mlrt = WidenedMlrt(wanted)
                 self._mitsuba = MitsubaRenderer(wanted, self._mlrt.integrator)
             except MlrtError as error:
                 raise BenchError(str(error)) from error
             finally:
                 show_status("")
+
+    def facts(self) -> dict[str, Any]:
+        """What does not depend on threads and samples: seconds of making the wide form,
+        None where there is none. No frame has them, unlike in `build`."""
+        widening = self._mlrt.widening
+        return {"wide": None if widening is None else asdict(widening)}
 
     def blocks(self) -> Iterator[dict[str, Any]]:
         """Figures of each number of samples and of threads, as JSON has them."""

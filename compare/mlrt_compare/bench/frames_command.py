@@ -37,7 +37,8 @@ def run(options: argparse.Namespace, library: LibLlvm) -> bool:
         return FrameBenchmark(chosen.name, path, settings)
 
     def measure(benchmark: FrameBenchmark, scene: dict[str, Any]) -> None:
-        scene["blocks"] = []
+        scene |= {**benchmark.facts(), "blocks": []}
+        show(frames_table.scene_lines(scene))
         for block in benchmark.blocks():
             scene["blocks"].append(block)
             show(frames_table.block_lines(scene, block))

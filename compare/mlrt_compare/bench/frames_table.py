@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .measure import best, median
-from .speedup import aims_text, frame_seconds, ratio_lines, ratio_text
+from .speedup import MEDIANS, aims_text, best_frame, median_frame, ratio_lines, ratio_text
 from .table import aligned, machine_lines, number, plural
 
 COLUMNS = ("", "frame ms", "median", "CPU ms", "median", "frames")
@@ -17,7 +16,20 @@ def head_lines(machine: dict[str, Any], settings: dict[str, Any]) -> list[str]:
         *machine_lines(machine),
         f"frame: {side} x {side}, direct light, from the loaded and built scene to the "
         "finished film; best of the frames that others left alone, which are counted of "
-        "all frames",
+        f"all frames; {MEDIANS}",
+    ]
+
+
+def scene_lines(scene: dict[str, Any]) -> list[str]:
+    """What holds for all frames of a scene."""
+    wide = scene["wide"]
+    if wide is None:
+        return []
+    return [
+        "",
+        f"{scene['name']}: the form of the tree for rays that go alone took "
+        f"{number(1e3 * wide['wall'])} ms ({number(1e3 * wide['cpu'])} ms of CPU time) "
+        "beforehand, which no frame has",
     ]
 
 
@@ -25,13 +37,15 @@ def block_lines(scene: dict[str, Any], block: dict[str, Any]) -> list[str]:
     """The table of one scene, number of samples and of threads."""
     rows: list[tuple[str, ...]] = [COLUMNS]
     for contender in block["contenders"]:
-        wall, cpu = (frame_seconds(contender, clock) for clock in ("wall", "cpu"))
         runs = contender["runs"]
         rows.append(
             (
                 contender["name"],
-                *(number(1e3 * figure(wall)) for figure in (best, median)),
-                *(number(1e3 * figure(cpu)) for figure in (best, median)),
+                *(
+                    number(1e3 * figure(contender, clock))
+                    for clock in ("wall", "cpu")
+                    for figure in (best_frame, median_frame)
+                ),
                 f"{sum(not run['busy'] for run in runs)}/{len(runs)}",
             )
         )

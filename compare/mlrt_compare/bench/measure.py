@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import statistics
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -76,6 +77,15 @@ def timed(work: Callable[[], T], seconds_of: Callable[[T], Any]) -> tuple[T, Tim
     waited = max(waiting_seconds() - before, 0.0)
     seconds = seconds_of(result)
     return result, Timing(float(seconds.wall), float(seconds.cpu), waited)
+
+
+def process_timed(work: Callable[[], object]) -> Timing:
+    """Runs the work; of the whole process."""
+    waited, cpu, wall = waiting_seconds(), time.process_time(), time.perf_counter()
+    work()
+    wall = time.perf_counter() - wall
+    cpu = time.process_time() - cpu
+    return Timing(wall, cpu, max(waiting_seconds() - waited, 0.0))
 
 
 def in_turns(

@@ -3,7 +3,6 @@ Embree."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -17,7 +16,7 @@ from .camera_rays import Rays, camera_rays, morton_order
 from .contenders import EMBREE, MLRT, QUALITIES, embree_device
 from .frame_runs import FrameRun, measured_in_turns
 from .goals import counted_runs
-from .measure import Timing, best, waiting_seconds
+from .measure import best, process_timed
 from .native import Native
 from .scenes import BenchScene, camera_of
 from .status import show_status
@@ -95,18 +94,16 @@ def run(
     number: int,
 ) -> FrameRun:
     show_status(f"{status}, run {number + 1}")
-    waited, cpu, wall = waiting_seconds(), time.process_time(), time.perf_counter()
-    trace(origins, directions)
-    wall = time.perf_counter() - wall
-    cpu = time.process_time() - cpu
-    timing = Timing(wall, cpu, max(waiting_seconds() - waited, 0.0))
+    timing = process_timed(partial(trace, origins, directions))
     return FrameRun(timing, 1, timing.busy(threads))
 
 
 def contenders(native: Native, scene: BenchScene, threads: int) -> dict[str, Trace]:
     """MLRT as it traces by default, barycentric coordinates included, then Embree in each
-    of its modes. Arrays are read and written by all of them."""
+    of its modes. Arrays are read and written by all of them. MLRT's tree has its wide form
+    beforehand."""
     tree = KdTree(scene.vertices, scene.faces)
+    tree.widen()
 
     def mlrt(origins: FloatArray, directions: FloatArray) -> HitArrays:
         hits = tree.closest_hit(origins, directions)
