@@ -235,6 +235,10 @@ def test_peak_memory_holds_what_was_built(native: Native, cache: Path) -> None:
         (("frames", "--spp", "0"), "0 is not from 1"),
         (("frames", "--scenes", "bunny"), "no scene 'bunny'"),
         (("build", "--source", SCENE.parent), "not a source checkout"),
+        (("build", "--json", ""), "argument --json: an empty name is given"),
+        (("build", "--source", ""), "argument --source: an empty name is given"),
+        (("ats", "--markdown", ""), "argument --markdown: an empty name is given"),
+        (("ats", "--markdown", SCENE.parent / "no" / "such.md"), "no folder"),
     ],
 )
 def test_what_cannot_run_is_one_sentence(
@@ -243,6 +247,25 @@ def test_what_cannot_run_is_one_sentence(
     child = command(*arguments, *(("--cache", tmp_path) if arguments else ()))
     assert_one_sentence(child, said)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["build", "rays", "ats", "watertight"])
+def test_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path, name: str) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    for cache in (file, file / "below", "/proc/foo"):
+        child = command(name, "--cache", cache)
+        assert_one_sentence(child, f"the folder {cache} for --cache cannot be made")
+    child = command(name, "--cache", "")
+    assert_one_sentence(child, "argument --cache: an empty name is given")
+
+
+@pytest.mark.parametrize("name", ["build", "frames"])
+def test_instruction_set_that_is_not_there_is_one_sentence(
+    tmp_path: Path, name: str
+) -> None:
+    child = command(name, "--cache", tmp_path, MLRT_ISA="sse")
+    assert_one_sentence(child, "mlrt-bench: MLRT_ISA='sse' is not available", "choose one")
 
 
 def test_help_tells_the_exit_codes() -> None:

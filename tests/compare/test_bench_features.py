@@ -36,6 +36,7 @@ def test_each_scene_has_its_feature_and_no_other(tmp_path: Path) -> None:
     def features(content: str) -> set[str]:
         scene = prepared_with(BOX, content, 8, tmp_path, cube)
         assert isinstance(scene, PreparedScene)
+        assert scene.report["wide_bytes"] > 0  # which no frame is to make
         small, numbers = scene.arrays.shapes[-1], scene.arrays.material_textures
         assert numbers is not None and small.face_count == 12
         front, _, opacity = numbers[small.material]

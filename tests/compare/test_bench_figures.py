@@ -9,9 +9,14 @@ import repository
 from bench_figures import block, run
 from mlrt_compare.bench import build_table, table
 from mlrt_compare.bench.frame_runs import FrameRun, measured_in_turns, needs_run
-from mlrt_compare.bench.goals import Goal, counted_runs, goals_of, seconds
+from mlrt_compare.bench.goals import Goal, best_of, counted_runs, goals_of, median_of
 from mlrt_compare.bench.measure import Timing, in_turns
-from mlrt_compare.bench.rays_contenders import ray_contenders
+from mlrt_compare.bench.rays_contenders import (
+    RayContender,
+    Variant,
+    choose_variant,
+    ray_contenders,
+)
 from mlrt_compare.bench.rays_goals import (
     cost_of_exactness,
     cost_of_watertightness,
@@ -51,9 +56,31 @@ def test_disturbed_runs_are_found(timing: Timing, threads: int, busy: bool) -> N
 
 def test_disturbed_runs_count_only_if_there_are_no_others() -> None:
     runs = [run(9.0, 1.0, busy=True), run(2.0, 1.0), run(3.0, 1.0)]
-    assert seconds({"runs": runs}, ("build",)) == [2.0, 3.0]
-    assert seconds({"runs": runs}, ("build", "frame")) == [3.0, 4.0]
+    both = ("build", "frame")
+    assert best_of({"runs": runs}, ("build",), "wall") == 2.0
+    assert median_of({"runs": runs}, ("build",), "wall") == 2.5
+    assert best_of({"runs": runs}, both, "cpu") == 3.0
+    assert median_of({"runs": runs}, both, "cpu") == 3.5
     assert counted_runs({"runs": runs[:1]}) == runs[:1]
+
+
+@pytest.mark.parametrize(
+    ("walls", "median"),
+    [
+        ([58.7, 60.0, 61.0, 139.6, 140.0], 60.0),  # the two are left out
+        ([58.7, 60.0, 76.0, 77.0], 60.0),  # so is the last: 1.3 * 58.7 = 76.3
+        ([58.7, 60.0, 139.6, 140.0], 99.8),  # two are too few
+    ],
+)
+def test_medians_are_of_runs_that_took_little_more_cpu_time_than_the_best(
+    walls: list[float], median: float
+) -> None:
+    contender = {"runs": [run(1.0, wall) for wall in walls]}
+    assert median_of(contender, ("frame",), "wall") == pytest.approx(median)
+    assert best_of(contender, ("frame",), "wall") == 58.7
+    assert len(contender["runs"]) == len(counted_runs(contender)) == len(walls)
+    # Of either side alike.
+    assert speedup(contender, [contender], None, None).median == 1
 
 
 @pytest.mark.parametrize(
@@ -248,6 +275,30 @@ def test_every_mode_of_embree_is_tried_with_every_tile() -> None:
         assert streams["NM"] == [(f"NM{n}", tile) for n in (8, 16) for tile in (16, 64)]
         assert streams["1M"] == [("1M", 16), ("1M", 64)]
     assert not tried
+
+
+def test_tiles_are_chosen_by_three_frames_that_are_taken_in_turns() -> None:
+    cpu = {16: [3.0, 2.0, 2.0], 32: [2.0, 1.0, 9.0], 64: [2.5, 2.5, 1.5], 128: [3.1]}
+    taken: list[int] = []
+
+    def frame(variant: Variant) -> Timing:
+        seconds = cpu[variant.tile][taken.count(variant.tile)]
+        taken.append(variant.tile)
+        return Timing(seconds, seconds, 0.0)
+
+    contender = RayContender("MLRT", "", [Variant("group", t, print) for t in cpu])
+    choose_variant(contender, frame)
+    # 128 is more than 1.5 times what 32 takes after the first frame, 16 and 64 after two.
+    assert taken == [16, 32, 64, 128, 16, 32, 64, 32]
+    assert contender.chosen is not None and contender.chosen.tile == 32
+    assert [trial["frames"] for trial in contender.tuning] == [2, 3, 2, 1]
+    assert [trial["cpu"] for trial in contender.tuning] == [2.0, 1.0, 2.5, 3.1]
+
+
+def test_quick_tiles_have_five_frames() -> None:
+    contender = RayContender("MLRT", "", [Variant("group", t, print) for t in (16, 32)])
+    choose_variant(contender, lambda variant: Timing(1e-3, 1e-3, 0.0))
+    assert [trial["frames"] for trial in contender.tuning] == [5, 5]
 
 
 def test_cost_of_exactness_is_told_of_the_same_runs() -> None:

@@ -51,6 +51,7 @@ def test_figures_are_whole(measured: tuple[str, dict[str, Any]]) -> None:
     assert [(b["spp"], b["threads"]) for b in office["blocks"]] == [
         *((1, 1), (1, 2), (16, 1), (16, 2))
     ]
+    assert office["wide"]["wall"] > 0
     goals = {1: (12.0, 15.0), 16: (10.0, 10.0)}
     for block in office["blocks"]:
         own, peer = block["contenders"]
@@ -74,6 +75,11 @@ def test_tables_are_there(measured: tuple[str, dict[str, Any]]) -> None:
     assert any(line.startswith("absent: skipped, there is no absent.xml") for line in lines)
     assert lines[-2].startswith("office, 1 thread ")
     assert lines[-1].startswith("office, 2 threads ")
+
+
+def test_no_frame_makes_the_wide_form(measured: tuple[str, dict[str, Any]]) -> None:
+    told = "office: the form of the tree for rays that go alone took"
+    assert sum(line.startswith(told) for line in measured[0].splitlines()) == 1
 
 
 def test_image_that_does_not_agree_is_told(tmp_path: Path) -> None:
