@@ -91,7 +91,7 @@ def step_lines(scene: dict[str, Any]) -> list[str]:
         f"{number(ats['packets_from_the_root'])}"
     ]
     for row in ats["with_entry_points"]:
-        for counted in row["counted"]:
+        for counted in row["counted"] if row["cells"] else row["counted"][:1]:
             cells = plural_steps(counted["cell_steps"])
             line = (
                 f"  {entry_points(row)}, a cell {cells}: {number(counted['steps'])}, "
