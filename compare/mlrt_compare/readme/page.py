@@ -14,6 +14,7 @@ from typing import Any
 
 from ..bench.errors import BenchError
 from .pictures import Pair, Plot
+from .steps import ats_lines
 from .tables import (
     frame_lines,
     kernel_lines,
@@ -73,6 +74,7 @@ def page_of(source: Path) -> Page:
         ("Frames beside Mitsuba", "frames*.json", frame_lines),
         ("Orders of rays", "order*.json", order_lines),
         ("Tables of the paper", "paper*/paper.json", paper_lines),
+        ("Steps from entry points", "ats*.json", ats_lines),
         ("Rays that have little in common", "kernels*.json", kernel_lines),
         ("Rays that leak", "watertight*.json", leak_lines),
     ):
