@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from .tables import Figures, machines_of, table
+from ..bench.markdown import table
+from .tables import Figures, machines_of
 
 
 def ats_lines(all_figures: Figures) -> list[str]:
@@ -24,8 +25,8 @@ def ats_lines(all_figures: Figures) -> list[str]:
         "steps packets take from one entry point a tile, and from up to eight, of which a "
         "packet is clipped to cells that count as one step or as three; primary rays, the "
         "default tree. One entry point saves less here than in the paper since it must "
-        "hold all leaves that a tile's beam may enter, and in these scenes and views one plane "
-        f"near the root often lies between them. {machines_of(all_figures)}.",
+        "hold all leaves that a tile's beam may enter, and in these scenes and views one "
+        f"plane near the root often lies between them. {machines_of(all_figures)}.",
         "",
         *table(
             (
