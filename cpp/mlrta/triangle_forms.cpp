@@ -237,14 +237,9 @@ LaneBits TriangleForms::possible_for(const BeamPackets::Run &run) const {
 void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
                         const uint32_t *numbers, uint32_t count) {
     wide_ = count > BLOCK_WIDTH;
-    if (beam.parallel) {
-        if (wide_)
-            set_parallel_block<FloatWide>(beam, least, triangles, numbers, count);
-        else
-            set_parallel_block<FloatBlock>(beam, least, triangles, numbers, count);
-        return;
-    }
-    if (wide_)
+    if (beam.parallel)
+        set_parallel(beam, least, triangles, numbers, count);
+    else if (wide_)
         set_block<FloatWide>(beam, least, triangles, numbers, count);
     else
         set_block<FloatBlock>(beam, least, triangles, numbers, count);
