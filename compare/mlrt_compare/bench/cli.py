@@ -18,6 +18,7 @@ from .options import (
     Parser,
     add_sample_counts,
     add_shared_options,
+    add_source_option,
     add_study_options,
     check_folder_of,
     check_json,
@@ -250,12 +251,7 @@ def make_parser() -> Parser:
         metavar="N",
         help="pixels along both sides of the image (%(default)s)",
     )
-    offsets.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(offsets)
     readme = commands.add_parser(
         "readme",
         help="the results that README.md shows, from the figures that are kept",
@@ -268,12 +264,7 @@ def make_parser() -> Parser:
         action="store_true",
         help="write nothing; the exit code is 2 if anything is not what the figures say",
     )
-    readme.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(readme)
     return parser
 
 

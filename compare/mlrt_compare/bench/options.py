@@ -61,6 +61,10 @@ def add_shared_options(
         metavar="DIR",
         help="folder for generated scenes and the native side (~/.cache/mlrt-bench)",
     )
+    add_source_option(command)
+
+
+def add_source_option(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--source",
         type=Path,
@@ -90,12 +94,7 @@ def add_study_options(command: argparse.ArgumentParser, *, rays: int) -> None:
     command.add_argument(
         "--cache", type=Path, metavar="DIR", help="folder for the native side"
     )
-    command.add_argument(
-        "--source",
-        type=Path,
-        metavar="DIR",
-        help="MLRT's source checkout (the current one)",
-    )
+    add_source_option(command)
 
 
 def add_sample_counts(command: argparse.ArgumentParser) -> None:
