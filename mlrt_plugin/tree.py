@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -167,20 +168,17 @@ class KdTree:
 
 
 def build_options(options: dict[str, Any]) -> dict[str, Any]:
-    unknown = sorted(set(options) - set(BUILD_OPTIONS))
-    if unknown:
-        raise TypeError(
-            f"unknown option '{unknown[0]}': choose from {', '.join(BUILD_OPTIONS)}"
-        )
-    return options
+    return known_options(options, BUILD_OPTIONS)
 
 
 def trace_options(options: dict[str, Any]) -> dict[str, Any]:
-    unknown = sorted(set(options) - set(TRACE_OPTIONS))
+    return known_options(options, TRACE_OPTIONS)
+
+
+def known_options(options: dict[str, Any], known: Collection[str]) -> dict[str, Any]:
+    unknown = sorted(set(options) - set(known))
     if unknown:
-        raise TypeError(
-            f"unknown option '{unknown[0]}': choose from {', '.join(TRACE_OPTIONS)}"
-        )
+        raise TypeError(f"unknown option '{unknown[0]}': choose from {', '.join(known)}")
     return options
 
 

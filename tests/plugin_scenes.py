@@ -87,6 +87,16 @@ def texture(name: str, plugin: str, content: str = "") -> str:
     return f'<texture type="{plugin}" name="{name}">{content}</texture>'
 
 
+SKY = (
+    '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
+    '<float name="scale" value="0.7"/><transform name="to_world">'
+    '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
+)
+COMPENSATED = SKY.replace(
+    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
+)
+CONSTANT = f'<emitter type="constant">{colour("radiance")}</emitter>'
+
 BUMPS = texture("arbitrary", "bitmap", text("filename", "image.png"))
 
 SCENES = {

@@ -40,17 +40,11 @@ const EnumNames<ArrayMode> ARRAY_MODES{{"r16 coherent", ArrayMode::coherent_pack
                                        {"r16 incoherent", ArrayMode::incoherent_packets},
                                        {"1M incoherent", ArrayMode::single_rays}};
 
-template <typename Mode>
-Mode mode_from(const EnumNames<Mode> &modes, const std::string &name) {
-    std::string known;
-    for (size_t i = 0; i < modes.size(); ++i) {
-        const auto &[each, mode] = modes[i];
-        if (name == each)
-            return mode;
-        known += (i == 0 ? "" : i + 1 < modes.size() ? ", " : " or ") + std::string(each);
-    }
-    refuse_value("mode must be " + known + ".");
-}
+const EnumNames<Kernel> KERNELS{{"single", Kernel::single_precision},
+                                {"double", Kernel::double_precision},
+                                {"pluecker", Kernel::pluecker},
+                                {"sheared", Kernel::sheared},
+                                {"exact", Kernel::exact}};
 
 Mesh mesh_from(const Points &vertices, const Faces &faces) {
     Mesh mesh;
@@ -148,23 +142,19 @@ void bind_input(nb::module_ &m) {
         .def_ro("bytes", &WideForm::bytes);
 }
 
-Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
-                          const Points &origins, const Points &directions,
-                          const Distances &t, const Numbers &primitives) {
+size_t ray_count(const Points &origins, const Points &directions, const Distances &t,
+                 const Numbers &primitives) {
     const size_t count = origins.shape(0);
     if (directions.shape(0) != count || t.shape(0) != count || primitives.shape(0) != count)
         refuse_value("origins, directions, t and primitives must have the same length.");
-    Kernel kernel = Kernel::exact;
-    if (name == "single")
-        kernel = Kernel::single_precision;
-    else if (name == "double")
-        kernel = Kernel::double_precision;
-    else if (name == "pluecker")
-        kernel = Kernel::pluecker;
-    else if (name == "sheared")
-        kernel = Kernel::sheared;
-    else if (name != "exact")
-        refuse_value("kernel must be single, double, pluecker, sheared or exact.");
+    return count;
+}
+
+Seconds trace_with_kernel(const TimedTree &tree, const std::string &name,
+                          const Points &origins, const Points &directions,
+                          const Distances &t, const Numbers &primitives) {
+    const size_t count = ray_count(origins, directions, t, primitives);
+    const Kernel kernel = enumerator_of(KERNELS, name, "kernel");
     nb::gil_scoped_release release;
     std::vector<float> columns[6];
     for (size_t k = 0; k < 6; ++k) {
@@ -287,12 +277,8 @@ void bind_embree(nb::module_ &m) {
             "closest_hit",
             [](const EmbreeScene &self, const Points &origins, const Points &directions,
                const Distances &t, const Numbers &primitives, const std::string &mode) {
-                const size_t count = origins.shape(0);
-                if (directions.shape(0) != count || t.shape(0) != count ||
-                    primitives.shape(0) != count)
-                    refuse_value("origins, directions, t and primitives must have the same "
-                                 "length.");
-                const ArrayMode chosen = mode_from(ARRAY_MODES, mode);
+                const size_t count = ray_count(origins, directions, t, primitives);
+                const ArrayMode chosen = enumerator_of(ARRAY_MODES, mode, "mode");
                 nb::gil_scoped_release release;
                 closest_hits(self, origins.data(), directions.data(), count, chosen,
                              t.data(), primitives.data());
@@ -309,7 +295,7 @@ void bind_embree(nb::module_ &m) {
             [](const EmbreeScene &self, const View &view, const Image &image,
                const std::optional<Primitives> &primitives, const std::optional<Bytes> &lit,
                const std::string &mode_name, uint32_t tile, bool shadows) {
-                const EmbreeMode mode = mode_from(EMBREE_MODES, mode_name);
+                const EmbreeMode mode = enumerator_of(EMBREE_MODES, mode_name, "mode");
                 const FrameSettings settings = settings_from(tile, shadows);
                 const FrameOutput output = output_from(view, image, primitives, lit);
                 nb::gil_scoped_release release;

@@ -4,17 +4,16 @@ renders."""
 from __future__ import annotations
 
 import re
-import tempfile
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
 import drjit as dr
 import mitsuba
 import numpy as np
 from numpy.typing import NDArray
+
+from mlrt_plugin.hybrid.mitsuba_log import captured_log
 
 from .mitsuba_scene import load_mitsuba_scene
 from .settings import Settings
@@ -45,7 +44,7 @@ class MitsubaRenderer:
         self.llvm = ".".join(map(str, dr.detail.llvm_version()))
         self._settings = settings
         start = time.perf_counter()
-        with _captured_log() as log:
+        with captured_log(mi.LogLevel.Info) as log:
             loaded = load_mitsuba_scene(settings, VARIANT, integrator)
             dr.sync_thread()
             text = log.read_log()
@@ -93,26 +92,6 @@ class MitsubaRenderer:
         for entry in dr.kernel_history([dr.KernelType.JIT]):
             self.kernels_from_disk += bool(entry["cache_disk"])
             self.kernels_compiled += not entry["cache_hit"]
-
-
-@contextmanager
-def _captured_log() -> Iterator[Any]:
-    """Sends Mitsuba's messages to a file for a while, those of level Info too."""
-    logger = mi.logger()
-    appenders = [logger.appender(i) for i in range(logger.appender_count())]
-    level = logger.log_level()
-    with tempfile.TemporaryDirectory() as folder:
-        log = mi.StreamAppender(str(Path(folder) / "log"))
-        logger.clear_appenders()
-        logger.add_appender(log)
-        logger.set_log_level(mi.LogLevel.Info)
-        try:
-            yield log
-        finally:
-            logger.set_log_level(level)
-            logger.clear_appenders()
-            for appender in appenders:
-                logger.add_appender(appender)
 
 
 def _build_seconds(log: str) -> float | None:

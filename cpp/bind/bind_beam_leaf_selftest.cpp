@@ -160,11 +160,11 @@ nb::dict describe(const BeamUnderTest &self) {
     dict["side"] = beam.side;
     dict["rectangle"] =
         std::array{r.center_u, r.center_v, r.cosine, r.sine, r.half_p, r.half_q};
-    dict["greatest_sum"] = beam.greatest_sum;
+    dict["spread"] = beam.spread;
+    dict["common_slopes"] = std::array{beam.slope_u, beam.slope_v};
     dict["packets"] = packets;
     if (beam.parallel) {
         dict["origin"] = std::array{beam.origin.x, beam.origin.y, beam.origin.z};
-        dict["common_slopes"] = std::array{beam.slope_u, beam.slope_v};
     }
     return dict;
 }

@@ -267,7 +267,8 @@ void bind_triangle_test(nb::module_ &s) {
         "needed.");
     s.def("hit_distance", [](const Point &origin, const Point &direction,
                              const std::array<Point, 3> &triangle) {
-        return hit_distance(vec(origin), vec(direction), triangle_of(triangle));
+        Counters counters;
+        return hit_distance(vec(origin), vec(direction), triangle_of(triangle), counters);
     });
     s.def("exact_distance", [](const Point &origin, const Point &direction,
                                const std::array<Point, 3> &triangle) {

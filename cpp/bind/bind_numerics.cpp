@@ -27,11 +27,13 @@ nanobind::object compressed(const FloatArray &values, LaneBits bits) {
     return to_numpy<float>(std::move(kept), {count});
 }
 
-// A register of values, fewer than there are lanes, and zeros.
-nanobind::object padded(const FloatArray &values) {
-    std::vector<float> lanes(WIDE_WIDTH);
-    store(lanes.data(), load_first<FloatWide>(values.data(), uint32_t(values.shape(0))));
-    return to_numpy<float>(std::move(lanes), {WIDE_WIDTH});
+// The first values, fewer than there are lanes, and zeros.
+template <typename Packet>
+nanobind::object padded(const FloatArray &values, int32_t count) {
+    constexpr size_t WIDTH = LANES_OF<Packet>;
+    std::vector<float> lanes(WIDTH);
+    store(lanes.data(), load_first<Packet>(values.data(), uint32_t(count)));
+    return to_numpy<float>(std::move(lanes), {WIDTH});
 }
 
 } // namespace
@@ -39,7 +41,8 @@ nanobind::object padded(const FloatArray &values) {
 void bind_numerics(nanobind::module_ &m) {
     m.def("multiply_subtract", &multiply_subtract);
     m.def("compressed", &compressed);
-    m.def("padded", &padded);
+    m.def("padded", &padded<FloatPacket>);
+    m.def("padded_block", &padded<FloatBlock>);
 }
 
 } // namespace mlrt

@@ -26,6 +26,19 @@ namespace mlrt {
 template <typename Enum>
 using EnumNames = std::vector<std::pair<const char *, Enum>>;
 
+// The enumerator of this name; `what` says in a refusal what is named.
+template <typename Enum>
+Enum enumerator_of(const EnumNames<Enum> &names, const std::string &name,
+                   const std::string &what) {
+    std::string known;
+    for (const auto &[candidate, result] : names) {
+        if (name == candidate)
+            return result;
+        known += (known.empty() ? "" : ", ") + std::string(candidate);
+    }
+    refuse_value(what + " must be one of: " + known + ".");
+}
+
 // One dict. Its keys are the names of a struct's fields; `finish` refuses those that nobody
 // read.
 class Fields {
@@ -114,13 +127,7 @@ public:
             nanobind::isinstance<nanobind::str>(given)
                 ? std::string(nanobind::borrow<nanobind::str>(given).c_str())
                 : std::string();
-        std::string known;
-        for (const auto &[candidate, result] : names) {
-            if (text == candidate)
-                return result;
-            known += (known.empty() ? "" : ", ") + std::string(candidate);
-        }
-        refuse_value(path(key) + " must be one of: " + known + ".");
+        return enumerator_of(names, text, path(key));
     }
     template <typename Enum>
     Enum choice(const char *key, const EnumNames<Enum> &names, Enum otherwise) {

@@ -1,6 +1,5 @@
 // Where rays cross triangles they are known to hit, for one ray or sixteen with a triangle
-// each: the operations of barycentrics() in triangle_test.h in the same order, hence the
-// same bits.
+// each: the same operations in the same order, hence the same bits.
 #pragma once
 
 #include "base/simd.h"

@@ -1,6 +1,7 @@
 #include "geometry/triangle_test.h"
 
 #include "base/expansion.h"
+#include "geometry/packet_barycentrics.h"
 
 #include <algorithm>
 #include <array>
@@ -120,30 +121,21 @@ float exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
     return side < 0 ? below : side > 0 ? above : float(midpoint);
 }
 
-float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle) {
+float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle,
+                   Counters &counters) {
     const TrianglePlane plane(triangle);
     const PlaneNumerator<double> numerator(plane, Vec3d(triangle.a) - Vec3d(origin));
     const Vec3d d(direction);
     const PlaneDistance<double> distance(plane, numerator, d, max_component(abs(d)));
-    return distance.certain<float>() ? distance.rounded<float>()
-                                     : exact_distance(origin, direction, triangle);
+    if (distance.certain<float>())
+        return distance.rounded<float>();
+    ++counters.exact_distances;
+    return exact_distance(origin, direction, triangle);
 }
 
 Vec2f barycentrics(Vec3f origin, Vec3f direction, const Triangle &triangle) {
-    const Vec3d o(origin), d(direction);
-    const Vec3d a = Vec3d(triangle.a) - o;
-    const Vec3d b = Vec3d(triangle.b) - o;
-    const Vec3d c = Vec3d(triangle.c) - o;
-    // All three have one sign or are rounding noise around zero.
-    const double u = std::abs(dot(d, cross(b, c)));
-    const double v = std::abs(dot(d, cross(c, a)));
-    const double w = std::abs(dot(d, cross(a, b)));
-    const double sum = u + v + w;
-    if (!(sum > 0))
-        return {0, 0};
-    const double scale = 1 / sum;
-    const float weight_b = float(v * scale);
-    return {weight_b, std::min(float(w * scale), 1 - weight_b)};
+    return barycentrics_of(origin, direction,
+                           Corners<float>{triangle.a, triangle.b, triangle.c});
 }
 
 } // namespace mlrt

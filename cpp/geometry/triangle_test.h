@@ -15,6 +15,7 @@
 // Neither depends on the order of evaluation, so kernels may filter both in any way.
 #pragma once
 
+#include "base/counters.h"
 #include "base/simd.h"
 #include "base/vec.h"
 #include "geometry/triangle.h"
@@ -143,7 +144,8 @@ struct PlaneDistance {
 float exact_distance(Vec3f origin, Vec3f direction, const Triangle &triangle);
 
 // The same, by exact arithmetic only where double precision does not suffice.
-float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle);
+float hit_distance(Vec3f origin, Vec3f direction, const Triangle &triangle,
+                   Counters &counters);
 
 // Weights of the vertices b and c at the hit point of a ray that decide_hit() accepts
 // (Mitsuba's prim_uv), in [0, 1] and with u + v <= 1.

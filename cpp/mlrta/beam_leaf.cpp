@@ -89,8 +89,9 @@ void BeamWalk<query>::prepare_sides() {
     const SlopeRectangle &r = beam_.rectangle;
     const auto [i, j, k] = beam_.axes;
     const float c = r.cosine, s = r.sine;
-    const float at_p = r.center_u * c + r.center_v * s;
-    const float at_q = r.center_v * c - r.center_u * s;
+    const float u = beam_.slope_u + r.center_u, v = beam_.slope_v + r.center_v;
+    const float at_p = u * c + v * s;
+    const float at_q = v * c - u * s;
     const float less_p = beam_.side * (-at_p - r.half_p);
     const float more_p = beam_.side * (at_p - r.half_p);
     const float less_q = beam_.side * (-at_q - r.half_q);
@@ -107,7 +108,9 @@ void BeamWalk<query>::prepare_sides() {
     const Box3f &bounds = tree_.bounds;
     const float reach = std::max(max_component(abs(bounds.lo - beam_.origin)),
                                  max_component(abs(bounds.hi - beam_.origin)));
-    side_slack_ = 16 * FLOAT_ROUNDOFF * reach * (2 + 2 * beam_.greatest_sum) + 0x1p-140f;
+    const float greatest_sum =
+        1 + std::abs(beam_.slope_u) + std::abs(beam_.slope_v) + beam_.spread;
+    side_slack_ = 16 * FLOAT_ROUNDOFF * reach * (2 + 2 * greatest_sum) + 0x1p-140f;
 }
 
 // Whether a cell lies wholly on the outer side of one of the beam's sides.

@@ -1,5 +1,6 @@
 #include "mlrta/beam_packets.h"
 
+#include "base/fused_difference.h"
 #include "base/transpose.h"
 #include "traverse/load_packet.h"
 #include "traverse/parameter_interval.h"
@@ -39,6 +40,11 @@ void BeamPackets::set_axes(Vec3f d) {
     side = d[k] > 0 ? 1.0f : -1.0f;
 }
 
+void BeamPackets::set_slopes(Vec3f d) {
+    slope_u = d[axes[0]] / std::abs(d[axes[2]]);
+    slope_v = d[axes[1]] / std::abs(d[axes[2]]);
+}
+
 // A register at a time, as all of its values would not fit into them else.
 BeamPackets::FarthestEnds BeamPackets::load_packet(const RayGroup &rays, uint32_t last,
                                                    uint32_t number) {
@@ -55,14 +61,12 @@ BeamPackets::FarthestEnds BeamPackets::load_packet(const RayGroup &rays, uint32_
         const Lanes dk = load_padded<Lanes>(rays.direction[k], first, last);
         const Lanes main = dk * side;
         const Lanes reciprocal = 1.0f / main;
-        const Lanes u = di * reciprocal, v = dj * reciprocal;
-        store_register(packet.u, lane, u);
-        store_register(packet.v, lane, v);
-        const Lanes size_u = absolute(u), size_v = absolute(v);
+        store_register(packet.u, lane,
+                       fused_difference(main, Lanes(slope_u), di) * reciprocal);
+        store_register(packet.v, lane,
+                       fused_difference(main, Lanes(slope_v), dj) * reciprocal);
         const auto inside = (main >= SMALLEST_MAIN) & (main <= LARGEST_MAIN) &
-                            (maximum(size_u, size_v) <= GREATEST_SLOPE) &
-                            ((size_u >= SMALLEST_SLOPE) | (di == 0.0f)) &
-                            ((size_v >= SMALLEST_SLOPE) | (dj == 0.0f));
+                            (maximum(absolute(di), absolute(dj)) <= GREATEST_SLOPE * main);
         // In this order NaN stays NaN, and the ray inactive.
         const Lanes t_min =
             maximum(Lanes(0.0f), load_padded<Lanes>(rays.t_min, first, last));
@@ -112,8 +116,11 @@ void BeamPackets::load_camera_packet(const RayGroup &rays, uint32_t number) {
         };
         const Lanes main = component(axes[2]) * side;
         const Lanes reciprocal = 1.0f / main;
-        store_register(packet.u, lane, component(axes[0]) * reciprocal);
-        store_register(packet.v, lane, component(axes[1]) * reciprocal);
+        const auto relative = [&](int axis, float slope) {
+            return fused_difference(main, Lanes(slope), component(axis)) * reciprocal;
+        };
+        store_register(packet.u, lane, relative(axes[0], slope_u));
+        store_register(packet.v, lane, relative(axes[1], slope_v));
         const auto [least, greatest] =
             ends_of(load_padded<Lanes>(rays.t_max, first, rays.count), main);
         store_register(packet.least, lane, least);
@@ -129,11 +136,11 @@ void BeamPackets::load_slopes(const RayGroup &rays) {
             load_camera_packet(rays, n);
 }
 
-// The image of the film's x axis in slopes, at the first packet.
+// The image of the film's x axis in slopes, at the ray that they are relative to.
 void BeamPackets::turn_as_film(const CameraMap &camera) {
     const auto [i, j, k] = axes;
-    const float x = camera.dx[i] - to_lanes<float>(packets[0].u)[0] * side * camera.dx[k];
-    const float y = camera.dx[j] - to_lanes<float>(packets[0].v)[0] * side * camera.dx[k];
+    const float x = camera.dx[i] - slope_u * side * camera.dx[k];
+    const float y = camera.dx[j] - slope_v * side * camera.dx[k];
     // In double, where squares neither underflow nor overflow.
     const double length = std::sqrt(double(x) * x + double(y) * y);
     if (!(length > 0) || !std::isfinite(length))
@@ -258,8 +265,8 @@ void BeamPackets::fit_rectangle() {
         LEAST_SLACK;
     rectangle.half_p = 0.5f * (beam_p1 - beam_p0) + slack;
     rectangle.half_q = 0.5f * (beam_q1 - beam_q0) + slack;
-    greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
-                   2 * (rectangle.half_p + rectangle.half_q);
+    spread = std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
+             2 * (rectangle.half_p + rectangle.half_q);
     least_half_p = least_half_q = 0;
     // Without rays the center is NaN, the sides are negative, and `least` is infinite.
     for (uint32_t r = 0; r < run_count(); ++r) {
@@ -274,6 +281,25 @@ void BeamPackets::fit_rectangle() {
         run.all = {0.5f * (run_p0 + run_p1) - mid_p, 0.5f * (run_q0 + run_q1) - mid_q,
                    0.5f * (run_p1 - run_p0) + slack, 0.5f * (run_q1 - run_q0) + slack,
                    least_lane(mlrt::load<FloatPacket>(run.least))};
+    }
+}
+
+// A relative slope has three roundings, and may lose what is smaller than a float by unit
+// of the main component. A range that ends near zero, but not there, ends at a slope that
+// keeps its digits or at zero, whichever is further out.
+void BeamPackets::bound_slopes() {
+    constexpr double LOST = 2 * double(SMALLEST_FLOAT) / double(SMALLEST_MAIN);
+    const float relative_to[2] = {slope_u, slope_v};
+    for (int n = 0; n < 2; ++n) {
+        const auto slope = [&](double relative, double outwards) {
+            const double error = 4 * double(FLOAT_ROUNDOFF) * std::abs(relative) + LOST;
+            const double value = relative_to[n] + relative + outwards * error;
+            if (std::abs(value) >= double(SMALLEST_SLOPE))
+                return float(value);
+            return value * outwards > 0 ? float(outwards) * SMALLEST_SLOPE : 0.0f;
+        };
+        slope_lo[n] = slope(slope_lo[n], -1);
+        slope_hi[n] = slope(slope_hi[n], 1);
     }
 }
 
@@ -310,9 +336,14 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     origin = rays.common_origin;
     count = 0;
     any_active = any_stray = false;
-    if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
+    if (!is_finite(origin))
+        return;
+    const std::optional<uint32_t> middle = choose_axis(rays, first, ray_count);
+    if (!middle)
         return;
     covered = unloaded = {};
+    set_slopes({rays.direction[0][*middle], rays.direction[1][*middle],
+                rays.direction[2][*middle]});
     std::optional<uint32_t> first_active;
     FarthestEnds farthest;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {
@@ -338,6 +369,7 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     else
         turn_as_rays();
     fit_rectangle();
+    bound_slopes();
     const float end = greatest_lane(farthest.greatest);
     for (uint32_t r = 0; r < run_count(); ++r)
         runs[r].greatest.fill(end);

@@ -2,10 +2,11 @@
 // main axis: what the beam-leaf traversal tests triangles against.
 //
 // Common origin: with k the main axis and i, j the two that follow it cyclically, the
-// direction of a ray is |d_k| (u, v, side) in the order (i, j, k), with the slopes u = d_i
-// / |d_k| and v = d_j / |d_k|; side is the sign that all d_k share. What is linear in the
-// direction is |d_k| times something linear in (u, v), and so is one over the depth z = t
-// |d_k| at which a plane is met.
+// direction of a ray is |d_k| (u + slope_u, v + slope_v, side) in the order (i, j, k): u
+// and v are its slopes d_i / |d_k| and d_j / |d_k| relative to those of a ray of the beam,
+// so that they keep the digits in which rays differ; side is the sign that all d_k share.
+// What is linear in the direction is |d_k| times something linear in (u, v), and so is one
+// over the depth z = t |d_k| at which a plane is met.
 //
 // Common direction, but for rounding: with x relative to a point of the beam, u = x_i -
 // slope_u z and v = x_j - slope_v z with z = side x_k are the same along a ray, and -z is
@@ -83,15 +84,17 @@ struct BeamPackets {
     bool any_active, any_stray;
     float nearest; // reciprocal depths below it lie behind every t_min
 
-    SlopeRectangle rectangle; // holds the slopes of all active rays
+    // What the slopes of rays are relative to; of parallel rays the common ones.
+    float slope_u, slope_v;
+    SlopeRectangle rectangle; // holds (u, v) of all active rays
+    float spread;             // the greatest |u| + |v| in it and in the boxes of runs
+    // Bounds of all slopes, which are relative to nothing; of parallel rays those of (u,
+    // v).
     float slope_lo[2], slope_hi[2];
-    float greatest_sum; // of 1 + |u| + |v| in the rectangle and in the boxes of runs
 
-    // Of parallel rays: the common slopes and how far those of a ray may deviate from them;
-    // the greatest coordinate of an origin, and how far u and v may be from what they are
-    // there.
-    float slope_u, slope_v, deviation;
-    float origin_reach, origin_error;
+    // Of parallel rays: how far slopes may deviate from the common ones, the greatest
+    // coordinate of an origin, and how far u and v may be from what they are there.
+    float deviation, origin_reach, origin_error;
     // What a ray hits at more than `greatest` lies behind its t_min for certain, at less
     // than `least` it does not.
     struct Begin {
@@ -192,6 +195,7 @@ private:
     }
 
     void set_axes(Vec3f direction);
+    void set_slopes(Vec3f direction);
     // Returns the ray that it was chosen by, if any is active.
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);
@@ -222,6 +226,7 @@ private:
     void turn_as_film(const CameraMap &camera);
     void turn_as_rays();
     void fit_rectangle();
+    void bound_slopes();
 };
 
 } // namespace mlrt

@@ -341,7 +341,7 @@ void BeamTriangleTests<query>::decide_parallel(uint32_t number, LaneBits lanes,
             if (!decision.hit)
                 return;
         }
-        const float t = hit_distance(ray.origin, ray.direction, triangle);
+        const float t = hit_distance(ray.origin, ray.direction, triangle, counters_);
         hits |= LaneBits(t > std::max(ray.t_min, 0.0f) && t <= ray.t_max && t < INFINITE)
                 << lane;
     });

@@ -64,8 +64,9 @@ bool BeamPackets::load_camera(const RayGroup &rays, uint32_t first, uint32_t ray
     return true;
 }
 
-// Coordinates p and q are rounded as fit_rectangle() has it. The middle of a
-// packet is computed as its rays are, with the same error.
+// Coordinates p and q, here relative to zero slopes, are rounded as fit_rectangle() has it.
+// Slopes are relative to the center. The middle of a packet has no greater error than
+// slopes that are relative to nothing.
 void BeamPackets::fit_to_film(const CameraTile &tile, uint32_t first,
                               const FilmSlopes &slopes) {
     rectangle = {};
@@ -77,10 +78,10 @@ void BeamPackets::fit_to_film(const CameraTile &tile, uint32_t first,
     }
     const double c = rectangle.cosine, s = rectangle.sine;
     const FilmCoordinate p = slopes.coordinate(c, s), q = slopes.coordinate(-s, c);
-    rectangle.center_u = float(c * p.middle() - s * q.middle());
-    rectangle.center_v = float(s * p.middle() + c * q.middle());
-    const double center_p = c * rectangle.center_u + s * rectangle.center_v;
-    const double center_q = c * rectangle.center_v - s * rectangle.center_u;
+    slope_u = float(c * p.middle() - s * q.middle());
+    slope_v = float(s * p.middle() + c * q.middle());
+    const double center_p = c * slope_u + s * slope_v;
+    const double center_q = c * slope_v - s * slope_u;
     const double half_p = std::max(center_p - p.range.lo, p.range.hi - center_p);
     const double half_q = std::max(center_q - q.range.lo, q.range.hi - center_q);
     const double slack = (slopes.slope(0).error + slopes.slope(1).error +
@@ -99,9 +100,8 @@ void BeamPackets::fit_to_film(const CameraTile &tile, uint32_t first,
     // |u| + |v| grows by at most sqrt(2) (|p| + |q|).
     const FilmRectangle widest =
         count > PACKET_WIDTH ? *film_of(tile, first, RUN_RAYS) : packet;
-    greatest_sum = 1 + std::abs(rectangle.center_u) + std::abs(rectangle.center_v) +
-                   1.5f * (rectangle.half_p + half_of(p, widest) + rectangle.half_q +
-                           half_of(q, widest));
+    spread = 1.5f * (rectangle.half_p + half_of(p, widest) + rectangle.half_q +
+                     half_of(q, widest));
     least_half_p = half_of(p, packet);
     least_half_q = half_of(q, packet);
     for (uint32_t r = 0; r < run_count(); ++r) {
@@ -140,8 +140,8 @@ void BeamPackets::set_middles(const CameraTile &tile, uint32_t first_of_run,
     };
     const auto [i, j, k] = axes;
     const FloatPacket reciprocal = 1.0f / (component(k) * side);
-    const FloatPacket du = component(i) * reciprocal - rectangle.center_u;
-    const FloatPacket dv = component(j) * reciprocal - rectangle.center_v;
+    const FloatPacket du = component(i) * reciprocal - slope_u;
+    const FloatPacket dv = component(j) * reciprocal - slope_v;
     const FloatPacket c(rectangle.cosine), s(rectangle.sine);
     constexpr float nowhere = std::numeric_limits<float>::quiet_NaN();
     run.center_p = masked(there, fused(du, c, dv * s), nowhere);

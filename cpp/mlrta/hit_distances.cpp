@@ -272,24 +272,12 @@ FloatPacket HitDistances::of(const RayGroup &rays, uint32_t first_ray, LaneBits 
     LaneArray<float> values = to_lanes<float>(distances);
     for_each_lane(open, [&](uint32_t lane) {
         const uint32_t ray = first_ray + lane;
+        const Vec3f direction{rays.direction[0][ray], rays.direction[1][ray],
+                              rays.direction[2][ray]};
         values[lane] =
-            of_one({rays.direction[0][ray], rays.direction[1][ray], rays.direction[2][ray]},
-                   numbers[lane], counters);
+            hit_distance(origin_, direction, tree_->triangles[numbers[lane]], counters);
     });
     return load<FloatPacket>(values);
-}
-
-// In double precision, and exactly where that does not suffice.
-float HitDistances::of_one(Vec3f direction, uint32_t primitive, Counters &counters) const {
-    const Triangle &triangle = tree_->triangles[primitive];
-    const TrianglePlane plane(triangle);
-    const PlaneNumerator<double> numerator(plane, Vec3d(triangle.a) - Vec3d(origin_));
-    const Vec3d d(direction);
-    const PlaneDistance<double> distance(plane, numerator, d, max_component(abs(d)));
-    if (distance.certain<float>())
-        return distance.rounded<float>();
-    ++counters.exact_distances;
-    return exact_distance(origin_, direction, triangle);
 }
 
 } // namespace mlrt

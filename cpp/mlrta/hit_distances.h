@@ -73,7 +73,6 @@ private:
     FloatPacket with_ones(FloatPacket distances, const RayGroup &rays, uint32_t first_ray,
                           LaneBits open, const UIntPacket &primitives,
                           Counters &counters) const;
-    float of_one(Vec3f direction, uint32_t primitive, Counters &counters) const;
 
     static constexpr uint32_t SIZE = 2048;
 

@@ -158,13 +158,13 @@ void TriangleForms::set_parallel_block(const BeamPackets &beam, float least,
     possible = to_bits(inside) & safe_bits;
 }
 
-template void TriangleForms::set_parallel_block<FloatBlock>(const BeamPackets &, float,
-                                                            const Triangle *,
-                                                            const uint32_t *, uint32_t);
-#if defined(__AVX512F__)
-template void TriangleForms::set_parallel_block<FloatWide>(const BeamPackets &, float,
-                                                           const Triangle *,
-                                                           const uint32_t *, uint32_t);
-#endif
+void TriangleForms::set_parallel(const BeamPackets &beam, float least,
+                                 const Triangle *triangles, const uint32_t *numbers,
+                                 uint32_t count) {
+    if (wide_)
+        set_parallel_block<FloatWide>(beam, least, triangles, numbers, count);
+    else
+        set_parallel_block<FloatBlock>(beam, least, triangles, numbers, count);
+}
 
 } // namespace mlrt

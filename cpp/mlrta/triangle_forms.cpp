@@ -18,23 +18,34 @@ constexpr float SMALLEST_DEPTH = 0x1p-60f;
 // What underflow may take from a component of a normal, and from a volume by unit of size.
 constexpr float UNDERFLOW = 0x1p-146f;
 
-// Bounds on errors, in units of roundoff.
+// Bounds on errors, in units of roundoff, with u of single and U of double precision.
 //
-// Edges: let s be the largest component of a vertex relative to the origin, e that of an
-// edge, and S the greatest 1 + |u| + |v|. A relative vertex is rounded once and an edge
-// once, so that each product of a normal's component has three roundings and their
-// difference a fourth, of at most 2 s e. Dividing by the volume rounds twice more. Slopes
-// have two roundings, and evaluating a form two: 10 in a row, of at most 2 s e S each. Over
-// a rectangle two roundings lead to the form's value at the center, three to its change
-// along a side, and at most five to the sum of all: 16 in a row. That is 32 s e S, and 20 s
-// e S for a ray; 40 and 21 cover products of roundings and the bound itself.
-constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF, RAY_ROUNDINGS = 21 * FLOAT_ROUNDOFF;
-// Depth: N comes from double precision, where thin triangles keep its digits. With n its
-// largest component, 12 roundings of at most n S are left, and that of the bound.
+// Vectors are sheared to (x - slope_u side z, y - slope_v side z, z), which leaves volumes
+// as they are, and the slopes of the beam's rays small. Let l be the largest x or y of a
+// sheared vertex relative to the origin, s its largest component before the shear, e that
+// of a sheared edge, and w the greatest |u| + |v| of rays. Slopes that others are relative
+// to do not exceed 2, so that the shear, or its inverse, makes no component more than three
+// times as large.
+//
+// Edges: a vertex is rounded to within u l along x and y and u s along z, after 8 U s in
+// double precision; an edge, in single precision, to within 6 u e and u e. A component of a
+// normal along x or y then has an error of at most u e (4 l + 9 s), and 18 u l e along z,
+// but for 8 U s e and 16 U s e. Dividing by the volume rounds twice more, of at most (l +
+// s) e and 2 l e, u and v have three roundings, and evaluating a form two: 26 u l e and w u
+// e (11 l + 16 s) in all. Over a rectangle there are six more: 38 u l e and w u e (17 l +
+// 22 s). With r = l + w (l + s) that is at most 26 u r e and 38 u r e; 28 and 40 cover
+// products of roundings and the bound itself, as 32 does for U s e (1 + w).
+constexpr float EDGE_ROUNDINGS = 40 * FLOAT_ROUNDOFF, RAY_ROUNDINGS = 28 * FLOAT_ROUNDOFF;
+constexpr float SHEAR_ROUNDINGS = float(32 * DOUBLE_ROUNDOFF);
+// Depth: N comes from double precision, where thin triangles keep its digits. With n the
+// largest of its components along x and y before the shear, and m its value where u and v
+// are zero, 12 roundings of at most m + w n are left, that of the bound, and of m in double
+// precision few of 5 times the largest component.
 constexpr float PLANE_ROUNDINGS = 16 * FLOAT_ROUNDOFF;
 // The volume a.N in double: N has a difference, a product and another difference, the rest
-// a difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2.
-constexpr double VOLUME_ROUNDINGS = 52 * DOUBLE_ROUNDOFF;
+// a difference, a product and two sums: 8 roundings in a row of three terms of 2 s e^2,
+// with e before the shear.
+constexpr double VOLUME_ROUNDINGS = 9 * 52 * DOUBLE_ROUNDOFF;
 
 } // namespace
 
@@ -50,25 +61,30 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     };
     const Vec3<Real> o{Real(beam.origin[i]), Real(beam.origin[j]), Real(beam.origin[k])};
     const Vec3<Real> va = vertex(block.a), vb = vertex(block.b), vc = vertex(block.c);
-    const Vec3<Real> a = va - o, b = vb - o, c = vc - o;
-    const Real size =
-        maximum(largest_component(a), maximum(largest_component(b), largest_component(c)));
-    const Real sum(beam.greatest_sum);
+    const Vec3<Real> oa = va - o, ob = vb - o, oc = vc - o;
+    const Real size = maximum(largest_component(oa),
+                              maximum(largest_component(ob), largest_component(oc)));
     const LaneBits given = (1u << count) - 1;
     MaskOf<Real> safe = EXACT ? size < LARGEST_SIZE : MaskOf<Real>(true);
 
-    // Where the vertices lie in the rectangle. A slope has four roundings, a difference,
-    // two products and a sum follow, and the middle and extent of all: less than 16 of at
-    // most the greatest coordinate and S.
-    const LaidRectangle<Real> rectangle(beam.rectangle);
+    // Where the vertices lie in the rectangle. A slope has four roundings, the center one,
+    // a difference, two products and a sum follow, and the middle and extent of all: less
+    // than 16 of at most the greatest coordinate and slope.
     const auto slopes = [&](const Vec3<Real> &v) -> Vec2<Real> {
         const Real reciprocal = 1.0f / (v.z * beam.side);
         return {v.x * reciprocal, v.y * reciprocal};
     };
-    const VertexBox<Real> box(rectangle, {slopes(a), slopes(b), slopes(c)});
-    const Real slack = (32 * FLOAT_ROUNDOFF) * (box.farthest() + sum);
-    const auto ahead = minimum(a.z * beam.side, minimum(b.z * beam.side, c.z * beam.side)) >
-                       SMALLEST_DEPTH;
+    LaidRectangle<Real> rectangle(beam.rectangle);
+    const Real center_u = rectangle.center_u, center_v = rectangle.center_v;
+    rectangle.center_u = center_u + beam.slope_u;
+    rectangle.center_v = center_v + beam.slope_v;
+    const VertexBox<Real> box(rectangle, {slopes(oa), slopes(ob), slopes(oc)});
+    const Real slack =
+        (32 * FLOAT_ROUNDOFF) * (box.farthest() + (1 + std::abs(beam.slope_u) +
+                                                   std::abs(beam.slope_v) + beam.spread));
+    const auto ahead =
+        minimum(oa.z * beam.side, minimum(ob.z * beam.side, oc.z * beam.side)) >
+        SMALLEST_DEPTH;
     // The box is right for all triangles whose vertices are moderate. A block that misses
     // with all of them needs nothing else, though some may be degenerate.
     const MaskOf<Real> misses = put_box(rectangle, box, slack, ahead);
@@ -76,24 +92,36 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     if ((given & ~to_bits(misses & safe)) == 0)
         return;
 
-    const Vec3<Real> ab = vb - va, bc = vc - vb, ca = va - vc;
+    using Precise = std::conditional_t<EXACT, DoubleOf<Real>, Real>;
+    const Vec3<Precise> pa(va), pb(vb), pc(vc), po(o);
+    // Gives z as it is rounded already.
+    const auto sheared = [&](const auto &v, const Real &z) -> Vec3<Real> {
+        using Component = std::decay_t<decltype(v.x)>;
+        const Component slope_u(beam.side * beam.slope_u);
+        const Component slope_v(beam.side * beam.slope_v);
+        return {Real(fused_difference(v.z, slope_u, v.x)),
+                Real(fused_difference(v.z, slope_v, v.y)), z};
+    };
+    const Vec3<Precise> to_vertex = pa - po;
+    const Vec3<Real> a = sheared(to_vertex, oa.z), b = sheared(pb - po, ob.z),
+                     c = sheared(pc - po, oc.z);
+    const auto edge_between = [&](const Vec3<Real> &from, const Vec3<Real> &to) {
+        const Vec3<Real> edge = to - from;
+        return sheared(edge, edge.z);
+    };
+    const Vec3<Real> ab = edge_between(va, vb), bc = edge_between(vb, vc),
+                     ca = edge_between(vc, va);
     Vec3<Real> normals[4] = {cross(b, bc), cross(c, ca), cross(a, ab)};
-    Real volume;
-    if constexpr (EXACT) {
-        using Double = DoubleOf<Real>;
-        const Vec3<Double> da = to_double(va);
-        const Vec3<Double> p = to_double(vb) - da, q = to_double(vc) - da;
-        const Vec3<Double> normal{fused_difference(p.z, q.y, Double(p.y * q.z)),
-                                  fused_difference(p.x, q.z, Double(p.z * q.x)),
-                                  fused_difference(p.y, q.x, Double(p.x * q.y))};
-        normals[DEPTH] = {Real(normal.x), Real(normal.y), Real(normal.z)};
-        const Vec3<Double> to_vertex = da - to_double(o);
-        volume = Real(fused(to_vertex.x, normal.x,
-                            fused(to_vertex.y, normal.y, Double(to_vertex.z * normal.z))));
-    } else {
-        normals[DEPTH] = cross(ca, ab);
-        volume = dot(a, normals[DEPTH]);
-    }
+    const Vec3<Precise> p = pb - pa, q = pc - pa;
+    const Vec3<Precise> normal{fused_difference(p.z, q.y, Precise(p.y * q.z)),
+                               fused_difference(p.x, q.z, Precise(p.z * q.x)),
+                               fused_difference(p.y, q.x, Precise(p.x * q.y))};
+    const Precise along_middle =
+        fused(normal.x, Precise(beam.side * beam.slope_u),
+              fused(normal.y, Precise(beam.side * beam.slope_v), normal.z));
+    normals[DEPTH] = {Real(normal.x), Real(normal.y), Real(along_middle)};
+    const Real volume(fused(to_vertex.x, normal.x,
+                            fused(to_vertex.y, normal.y, Precise(to_vertex.z * normal.z))));
 
     const Real inverse = 1.0f / volume;
     safe &= absolute(volume) > SMALLEST_VOLUME;
@@ -106,10 +134,21 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
         const Real inverse_size = absolute(inverse);
         share = volume_error * inverse_size;
         safe &= share <= LARGEST_SHARE;
-        edge_bound = (EDGE_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
-        ray_bound = (RAY_ROUNDINGS * (size * edge) + UNDERFLOW) * sum * inverse_size;
-        depth_bound = (PLANE_ROUNDINGS * largest_component(normals[DEPTH]) + UNDERFLOW) *
-                      sum * inverse_size;
+        const auto across = [](const Vec3<Real> &v) {
+            return maximum(absolute(v.x), absolute(v.y));
+        };
+        const Real local = maximum(across(a), maximum(across(b), across(c)));
+        const Real spread(beam.spread), sum = 1.0f + spread;
+        const Real reach = fused(spread, local + size, local);
+        const Real lost = (SHEAR_ROUNDINGS * (size * edge) + UNDERFLOW) * sum;
+        edge_bound = fused(EDGE_ROUNDINGS * reach, edge, lost) * inverse_size;
+        ray_bound = fused(RAY_ROUNDINGS * reach, edge, lost) * inverse_size;
+        const Real across_plane = across(normals[DEPTH]),
+                   middle = absolute(normals[DEPTH].z);
+        const Real plane_lost = SHEAR_ROUNDINGS * (across_plane + middle) + UNDERFLOW;
+        depth_bound = fused(Real(PLANE_ROUNDINGS), fused(spread, across_plane, middle),
+                            plane_lost * sum) *
+                      inverse_size;
         unsafe = given & ~to_bits(safe);
     } else {
         share = edge_bound = ray_bound = depth_bound = Real(0.0f);
@@ -126,6 +165,8 @@ void TriangleForms::set_block(const BeamPackets &beam, float least,
     if (possible == 0)
         return;
 
+    rectangle.center_u = center_u;
+    rectangle.center_v = center_v;
     Real greatest;
     for (int form = 0; form < 4; ++form) {
         greatest =
@@ -218,9 +259,12 @@ TriangleForms::Coverage TriangleForms::coverage_of(uint32_t lane, const BeamPack
     return packets;
 }
 
+// With P and Q the sides of the box around a triangle, the sides p and q of a rectangle in
+// the triangle satisfy p / P + q / Q <= 1.
 LaneBits TriangleForms::possible_covers(const BeamPackets &beam) const {
-    return possible & to_bits((load<FloatWide>(box_half_p) >= beam.least_half_p) &
-                              (load<FloatWide>(box_half_q) >= beam.least_half_q));
+    const auto half_p = load<FloatWide>(box_half_p), half_q = load<FloatWide>(box_half_q);
+    return possible & to_bits(fused(half_q, FloatWide(beam.least_half_p),
+                                    half_p * beam.least_half_q) <= half_p * half_q);
 }
 
 template <typename Real>
@@ -237,14 +281,9 @@ LaneBits TriangleForms::possible_for(const BeamPackets::Run &run) const {
 void TriangleForms::set(const BeamPackets &beam, float least, const Triangle *triangles,
                         const uint32_t *numbers, uint32_t count) {
     wide_ = count > BLOCK_WIDTH;
-    if (beam.parallel) {
-        if (wide_)
-            set_parallel_block<FloatWide>(beam, least, triangles, numbers, count);
-        else
-            set_parallel_block<FloatBlock>(beam, least, triangles, numbers, count);
-        return;
-    }
-    if (wide_)
+    if (beam.parallel)
+        set_parallel(beam, least, triangles, numbers, count);
+    else if (wide_)
         set_block<FloatWide>(beam, least, triangles, numbers, count);
     else
         set_block<FloatBlock>(beam, least, triangles, numbers, count);

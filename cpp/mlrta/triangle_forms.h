@@ -100,6 +100,8 @@ private:
     void set_block(const BeamPackets &beam, float least, const Triangle *triangles,
                    const uint32_t *numbers, uint32_t count);
 
+    void set_parallel(const BeamPackets &beam, float least, const Triangle *triangles,
+                      const uint32_t *numbers, uint32_t count);
     template <typename Real>
     void set_parallel_block(const BeamPackets &beam, float least, const Triangle *triangles,
                             const uint32_t *numbers, uint32_t count);

@@ -174,6 +174,15 @@ void for_each_sample(const Sampler &sampler, const uint32_t *seeds, const uint32
     }
 }
 
+// Two numbers in a row as a pair.
+template <typename Number>
+auto pair_of(const Number &number) {
+    return [number](Sample &sample) -> Vec2f {
+        const float x = number(sample);
+        return {x, number(sample)};
+    };
+}
+
 } // namespace
 
 bool takes(SamplerType type, uint32_t samples) {
@@ -204,12 +213,7 @@ void draw_spread_numbers(const Sampler &sampler, const uint32_t *seeds,
     switch (sampler.type) {
     case SamplerType::independent: {
         const auto number = [](Sample &sample) { return sample.random.next_float(); };
-        draw(
-            [&](Sample &sample) -> Vec2f {
-                const float x = number(sample);
-                return {x, number(sample)};
-            },
-            number);
+        draw(pair_of(number), number);
         break;
     }
     case SamplerType::stratified:
@@ -228,12 +232,7 @@ void draw_spread_numbers(const Sampler &sampler, const uint32_t *seeds,
         const auto number = [side = square_side(samples)](Sample &sample) {
             return orthogonal_number(sample, side);
         };
-        draw(
-            [&](Sample &sample) -> Vec2f {
-                const float x = number(sample);
-                return {x, number(sample)};
-            },
-            number);
+        draw(pair_of(number), number);
         break;
     }
     case SamplerType::ldsampler:

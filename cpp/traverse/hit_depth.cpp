@@ -25,7 +25,7 @@ bool decide_best(const DepthRay &ray, const Triangle &triangle, uint32_t primiti
         if (!decision.hit)
             return false;
     }
-    const float t = hit_distance(o, d, triangle);
+    const float t = hit_distance(o, d, triangle, counters);
     if (!(t > ray.t_min && t < INFINITE))
         return false;
     if (rival == NO_PRIMITIVE) {
@@ -33,7 +33,7 @@ bool decide_best(const DepthRay &ray, const Triangle &triangle, uint32_t primiti
             return false;
     } else {
         if (best.distance == UNKNOWN_DISTANCE)
-            best.distance = hit_distance(o, d, triangles[rival]);
+            best.distance = hit_distance(o, d, triangles[rival], counters);
         if (t > best.distance || (t == best.distance && primitive > rival))
             return false;
     }

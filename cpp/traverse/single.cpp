@@ -29,7 +29,7 @@ void test_triangle(const KdTree &tree, const Ray &ray, uint32_t primitive, Hit &
     counters.exact_tests += decision.precision == Precision::exact;
     if (!decision.hit)
         return;
-    const float t = hit_distance(ray.origin, ray.direction, triangle);
+    const float t = hit_distance(ray.origin, ray.direction, triangle, counters);
     if (t > ray.t_min && t < INFINITE &&
         (t < best.t || (t == best.t && primitive < best.primitive)))
         best = {t, primitive};

@@ -1,4 +1,4 @@
-"""What Mitsuba warns of, as sentences in place of lines on the terminal."""
+"""What Mitsuba logs, in a file or as sentences in place of lines on the terminal."""
 
 from __future__ import annotations
 
@@ -18,25 +18,34 @@ WARNING = re.compile(r" WARN +(?:\[[\w.]+:\d+\] )?(.*)")
 
 
 @contextmanager
-def captured_warnings() -> Iterator[list[str]]:
-    """A list that holds, in the end, what Mitsuba has warned of in this context."""
+def captured_log(level: Any) -> Iterator[Any]:
+    """Sends Mitsuba's messages of this level and above, a `mi.LogLevel`, to a file for a
+    while; yields its appender."""
     logger = mitsuba.logger()
     appenders = [logger.appender(i) for i in range(logger.appender_count())]
-    level = logger.log_level()
-    messages: list[str] = []
+    usual_level = logger.log_level()
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "log"
-        log = mitsuba.StreamAppender(str(file))
+        log = mitsuba.StreamAppender(str(Path(folder) / "log"))
         logger.clear_appenders()
         logger.add_appender(log)
-        logger.set_log_level(mi.LogLevel.Warn)
+        logger.set_log_level(level)
         try:
-            yield messages
+            yield log
         finally:
-            logger.set_log_level(level)
+            logger.set_log_level(usual_level)
             logger.clear_appenders()
             for appender in appenders:
                 logger.add_appender(appender)
+
+
+@contextmanager
+def captured_warnings() -> Iterator[list[str]]:
+    """A list that holds, in the end, what Mitsuba has warned of in this context."""
+    messages: list[str] = []
+    with captured_log(mi.LogLevel.Warn) as log:
+        try:
+            yield messages
+        finally:
             text = re.sub(r"\x1b\[[0-9;]*m", "", log.read_log())
             for line in text.splitlines():
                 match = WARNING.search(line)

@@ -23,10 +23,12 @@ def test_lanes_that_are_set_follow_one_another(core: ModuleType) -> None:
 
 @each_core
 def test_lanes_behind_the_last_value_are_zero(core: ModuleType) -> None:
-    width = len(core.padded(np.zeros(1, np.float32)))
-    assert width in (8, 16)
-    values = np.arange(1, width, dtype=np.float32)
-    for count in range(1, width):
-        lanes = core.padded(values[:count].copy())
-        np.testing.assert_array_equal(lanes[:count], values[:count])
-        np.testing.assert_array_equal(lanes[count:], 0)
+    """Of a register among several all lanes may lie behind it."""
+    values = np.arange(1, LANES, dtype=np.float32)
+    for pad, width, least in ((core.padded, LANES, 0), (core.padded_block, 8, -LANES)):
+        for count in range(least, width):
+            given = max(count, 0)
+            lanes = pad(values[:given].copy(), count)
+            assert len(lanes) == width
+            np.testing.assert_array_equal(lanes[:given], values[:given])
+            np.testing.assert_array_equal(lanes[given:], 0)

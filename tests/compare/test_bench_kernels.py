@@ -185,7 +185,7 @@ def test_what_the_native_side_refuses(native: Native) -> None:
     rays = np.ones((4, 3), np.float32)
     t, face = np.empty(4, np.float32), np.empty(4, np.uint32)
     with pytest.raises(
-        ValueError, match="kernel must be single, double, pluecker, sheared or exact"
+        ValueError, match="kernel must be one of: single, double, pluecker, sheared, exact"
     ):
         tree.trace_with("half", rays, rays, t, face)
     with pytest.raises(ValueError, match="the same length"):

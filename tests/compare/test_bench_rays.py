@@ -133,7 +133,7 @@ def test_native_side_refuses_what_does_not_fit(
     scene = module.EmbreeScene(
         module.EmbreeDevice("threads=1"), module.Mesh(office.vertices, office.faces), False
     )
-    with pytest.raises(ValueError, match="mode must be r16, NM8, NM16 or 1M"):
+    with pytest.raises(ValueError, match="mode must be one of: r16, NM8, NM16, 1M"):
         scene.render(view, image, mode="r8")
 
 

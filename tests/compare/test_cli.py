@@ -4,44 +4,19 @@ wrong."""
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from compare_command import BENT, python
 
 SCENE = Path(__file__).resolve().parents[2] / "scenes" / "cornell-box" / "cornell-box.xml"
 SMALL = ("--resolution", "32x24", "--spp", "2", "--rounds", "1")
 
-# Runs the command with MLRT's image bent by a function: a wrong renderer must be found out.
-BENT = """
-import sys
-from mlrt_compare import cli, llvm
-llvm.activate()
-from mlrt_compare.mlrt_renderer import MlrtRenderer
-right = MlrtRenderer.image.fget
-MlrtRenderer.image = property(lambda renderer: bend(right(renderer)))
-def bend(image):
-    return {how}
-sys.exit(cli.main(sys.argv[1:]))
-"""
-
 
 def command(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
     return python("-m", "mlrt_compare", *arguments, **environment)
-
-
-def python(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
-    # -P: the checkout, where tests are run from, holds mlrt_plugin without its native core.
-    return subprocess.run(
-        [sys.executable, "-P", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env={**os.environ, **environment},
-    )
 
 
 def assert_one_sentence(child: subprocess.CompletedProcess[str], *said: str) -> None:

@@ -3,41 +3,16 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import repository
+from compare_command import BENT, python
 from mlrt_compare.cli import main
 from PIL import Image as Pillow
 
 SCENE = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
 SMALL = ("--resolution", "48x48", "--spp", "1,2,4,8", "--rounds", "6")
-
-# Runs the command with MLRT's images bent by a function.
-BENT = """
-import sys
-from mlrt_compare import cli, llvm
-llvm.activate()
-from mlrt_compare.mlrt_renderer import MlrtRenderer
-right = MlrtRenderer.image.fget
-MlrtRenderer.image = property(lambda renderer: bend(right(renderer)))
-def bend(image):
-    return {how}
-sys.exit(cli.main(sys.argv[1:]))
-"""
-
-
-def python(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-P", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        env=dict(os.environ),
-    )
 
 
 @pytest.fixture(scope="module")

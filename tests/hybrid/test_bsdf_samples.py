@@ -10,6 +10,7 @@ import plugin_scenes as parts
 import pytest
 from mlrt_compare.metrics import differing_mask
 from native_parity import assert_parity
+from plugin_scenes import COMPENSATED, CONSTANT, SKY
 
 from mlrt_plugin import prepare
 
@@ -54,15 +55,6 @@ MESH = lamp_shape(
 AROUND = lamp_shape(
     "sphere", '<scale value="9"/>', '<boolean name="flip_normals" value="true"/>'
 )
-SKY = (
-    '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
-    '<float name="scale" value="0.7"/><transform name="to_world">'
-    '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
-)
-COMPENSATED = SKY.replace(
-    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
-)
-CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 LIGHTER_BALL = BALL.replace(
     '<emitter type="area">',
     '<emitter type="area"><float name="sampling_weight" value="3"/>',

@@ -10,6 +10,7 @@ import numpy as np
 import plugin_scenes as parts
 import pytest
 from native_parity import assert_parity
+from plugin_scenes import COMPENSATED, CONSTANT, SKY
 
 from mlrt_plugin import MlrtError, prepare
 from mlrt_plugin.samplers import possible_spp
@@ -20,15 +21,6 @@ NO_BSDF_SAMPLES = (
     '<integrator type="direct"><integer name="emitter_samples" value="1"/>'
     '<integer name="bsdf_samples" value="0"/></integrator>'
 )
-SKY = (
-    '<emitter type="envmap"><string name="filename" value="sky.exr"/>'
-    '<float name="scale" value="0.7"/><transform name="to_world">'
-    '<rotate x="1" angle="20"/><rotate y="1" angle="75"/></transform></emitter>'
-)
-COMPENSATED = SKY.replace(
-    "</emitter>", '<boolean name="mis_compensation" value="true"/></emitter>'
-)
-CONSTANT = f'<emitter type="constant">{parts.colour("radiance")}</emitter>'
 
 
 NEVER_CHOSEN = parts.PANEL.replace(

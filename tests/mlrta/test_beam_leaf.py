@@ -49,7 +49,8 @@ def fused(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
 
 
 class ExactBeam:
-    """The rays of a beam in the coordinates that it chose, as fractions."""
+    """The rays of a beam in the coordinates that it chose, as fractions: slopes are those
+    relative to its common ones."""
 
     def __init__(self, beam: Any, directions: FloatArray) -> None:
         self.told = beam.describe()
@@ -66,11 +67,12 @@ class ExactBeam:
             i, j, k = (Fraction(float(directions[ray][axis])) for axis in self.axes)
             assert k * self.side > 0
             self.main[ray] = abs(k)
-            self.slopes[ray] = (i / abs(k), j / abs(k))
+            common_u, common_v = map(Fraction, self.told["common_slopes"])
+            self.slopes[ray] = (i / abs(k) - common_u, j / abs(k) - common_v)
 
 
 @each_core
-@pytest.mark.parametrize("spread", [1e-3, 0.03, 0.4])
+@pytest.mark.parametrize("spread", [1e-6, 1e-3, 0.03, 0.4])
 def test_rectangles_hold_all_rays(core: ModuleType, spread: float) -> None:
     rng = np.random.default_rng(SEED)
     for count in [256] * 7 + [40, 1000, 1024]:
@@ -91,7 +93,7 @@ def test_rectangles_hold_all_rays(core: ModuleType, spread: float) -> None:
 
 
 @each_core
-@pytest.mark.parametrize("spread", [1e-3, 0.05])
+@pytest.mark.parametrize("spread", [1e-6, 1e-3, 0.05])
 def test_forms_are_as_near_as_they_say(core: ModuleType, spread: float) -> None:
     rng = np.random.default_rng(SEED)
     safe = 0
@@ -110,7 +112,9 @@ def test_forms_are_as_near_as_they_say(core: ModuleType, spread: float) -> None:
                 # Rounded as the beam does it.
                 i, j, k = (directions[ray][axis] for axis in exact.axes)
                 reciprocal = np.float32(1) / abs(k)
-                u, v = i * reciprocal, j * reciprocal
+                slope_u, slope_v = map(np.float32, exact.told["common_slopes"])
+                u = fused(-slope_u, abs(k), i) * reciprocal
+                v = fused(-slope_v, abs(k), j) * reciprocal
                 values = [
                     fused(of_u[n], u, fused(of_v[n], v, one[n]))
                     for one, of_u, of_v in (map(np.float32, form) for form in told["forms"])
@@ -132,11 +136,33 @@ def test_forms_are_as_near_as_they_say(core: ModuleType, spread: float) -> None:
                     error = Fraction(told["depth_error"][n])
                     assert x * Fraction(told["depth_shrink"][n]) - error <= depth
                     assert depth <= x * Fraction(told["depth_grow"][n]) + error
-    assert safe > 25, SEED
+    assert safe > (25 if spread > 1e-4 else 8), SEED
 
 
 @each_core
-@pytest.mark.parametrize("spread", [1e-3, 0.05, 0.4])
+def test_small_triangles_of_narrow_beams_keep_their_digits(core: ModuleType) -> None:
+    """The error of their forms is a share of how far apart the rays are, and not of where
+    they go."""
+    rng = np.random.default_rng(SEED)
+    compared = 0
+    for _ in range(20):
+        directions = bundle(rng, 0.2, 64)
+        narrow = directions[0] * (1 + 0 * directions)
+        narrow += np.float32(1e-4) * np.abs(narrow).max() * rng.uniform(-1, 1, (64, 3))
+        corners = ORIGIN + 5 * directions[0] / np.linalg.norm(directions[0])
+        triangle = np.float32(corners + rng.uniform(-1e-3, 1e-3, (3, 3)))
+        errors = []
+        for rays in (directions, np.float32(narrow)):
+            told = core.beam_leaf_selftest.Beam(ORIGIN, rays).forms(triangle)
+            errors.append(told["ray_error"][0] if told["possible"] & 1 else np.inf)
+        if np.isfinite(errors).all():
+            compared += 1
+            assert errors[1] < errors[0] / 50, (SEED, errors)
+    assert compared > 10, SEED
+
+
+@each_core
+@pytest.mark.parametrize("spread", [1e-6, 1e-3, 0.05, 0.4])
 def test_no_triangle_that_is_hit_is_rejected(core: ModuleType, spread: float) -> None:
     rng = np.random.default_rng(SEED)
     hit = rejected = rejected_by_runs = 0
@@ -163,7 +189,7 @@ def test_no_triangle_that_is_hit_is_rejected(core: ModuleType, spread: float) ->
                     assert kept_by_runs[ray // 256] or told["unsafe"] >> n & 1
     assert hit > 8, SEED
     assert rejected > 0 or spread > 0.1, SEED
-    assert rejected_by_runs > 0, SEED
+    assert rejected_by_runs > 0 or spread < 1e-4, SEED
 
 
 @each_core

@@ -123,3 +123,33 @@ def test_rays_that_go_elsewhere(core: ModuleType, traversal: str) -> None:
     expected = occluded(tree, rays, BRUTE_FORCE, 1e-4, t_max)
     found = occluded(tree, rays, {"traversal": traversal}, 1e-4, t_max)
     assert np.array_equal(found, expected)
+
+
+@each_core
+@pytest.mark.parametrize(("specks", "given_up"), [(300, False), (800, True)])
+def test_beams_beside_the_wide_tree_are_given_up_soon(
+    core: ModuleType, specks: int, given_up: bool
+) -> None:
+    """A beam of 256 rays among specks that stop none of them may be tested against 64
+    triangles and 1.2 for each ray, and what it is tested against at a time."""
+    rng = np.random.default_rng(SEED)
+    at = np.arange(256)
+    column, row = (sum((at >> 2 * k + i & 1) << k for k in range(4)) for i in (0, 1))
+    directions = np.stack([column - 7.5, row - 7.5, np.full(256, 320)], 1) / 80
+    rays = np.zeros((256, 3), np.float32), directions.astype(np.float32)
+    inside = np.column_stack([rng.uniform(-0.1, 0.1, (specks, 2)), np.full(specks, 4)])
+    centres = inside * rng.uniform(0.3, 0.9, (specks, 1))
+    corners = centres[:, None] + rng.uniform(-5e-4, 5e-4, (specks, 3, 3))
+    faces = np.arange(3 * specks, dtype=np.uint32).reshape(-1, 3)
+    tree = build(core, (corners.reshape(-1, 3).astype(np.float32), faces))
+    tree.widen()
+    most = 64 + 1.2 * len(directions)
+    met = beams_of(tree, rays, "beam_leaf")["beam_triangles"]
+    assert (most < met < 3 * len(directions)) == given_up, f"seed {SEED}"
+    counters = beams_of(tree, rays, "adaptive")
+    assert counters["beams"] == 1
+    assert counters["fallbacks"] == given_up
+    assert counters["beam_triangles"] < most + 32
+    expected = occluded(tree, rays, BRUTE_FORCE, 1e-4, END)
+    found = occluded(tree, rays, {"traversal": "adaptive"}, 1e-4, END)
+    assert np.array_equal(found, expected)
