@@ -60,7 +60,8 @@ def write_image(
             else:
                 write_png(temporary, image)
     except (OSError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
+        known = error.strerror if isinstance(error, OSError) else None
+        reason = known or " ".join(str(error).split())
         raise OutputError(f"output '{path}' cannot be written: {reason}") from error
 
 
