@@ -64,22 +64,24 @@ def is_special(path: Path) -> bool:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """The name of a temporary file, to be written, with the suffix of ``path``. In the end
-    it takes the place of ``path``, or is poured into what is special there; if anything
-    fails before, it goes. Raises OSError.
+def replacing(path: Path, suffix: str | None = None) -> Iterator[Path]:
+    """The name of a temporary file, to be written, with the suffix of ``path`` unless told
+    otherwise, as for folders that others look for such files in. In the end it takes the
+    place of ``path``, or is poured into what is special there; if anything fails before, it
+    goes. Raises OSError.
 
     Others see the old file or the new one, however many write at once.
     """
+    suffix = path.suffix if suffix is None else suffix
     if is_special(path):
         with tempfile.TemporaryDirectory(prefix="mlrt-") as folder:
-            temporary = Path(folder) / f"output{path.suffix}"
+            temporary = Path(folder) / f"output{suffix}"
             yield temporary
             with temporary.open("rb") as source, opened(path) as destination:
                 shutil.copyfileobj(source, destination)
         return
     target = Path(os.path.realpath(path))
-    name = f".{target.stem[:MOST_OF_STEM]}.{secrets.token_hex(8)}{path.suffix}"
+    name = f".{target.stem[:MOST_OF_STEM]}.{secrets.token_hex(8)}{suffix}"
     temporary = target.parent / name
     try:
         yield temporary

@@ -167,7 +167,7 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     Others see the old file or the new one, however many write at once. If anything fails,
     nothing is left.
     """
-    with replacing(path) as temporary, temporary.open("xb") as file:
+    with replacing(path, ".tmp") as temporary, temporary.open("xb") as file:
         yield file
         file.flush()
         os.fsync(file.fileno())
