@@ -18,7 +18,13 @@ import mitsuba as mi
 from . import __version__
 from .info import scene_report
 from .parsing import resolving_from
-from .render_command import add_render_options, add_shading, complaint, run_render
+from .render_command import (
+    add_render_options,
+    add_shading,
+    complaint,
+    file_path,
+    run_render,
+)
 from .tree_command import add_build_options, add_tree_cache, run_tree
 
 EXIT_ERROR, EXIT_USAGE, EXIT_INTERRUPTED = 1, 2, 130
@@ -74,7 +80,9 @@ def make_parser() -> argparse.ArgumentParser:
     )
     common.add_argument("-v", "--verbose", action="store_true", help="tell more")
     one_scene = Parser(add_help=False)
-    one_scene.add_argument("scene", type=Path, metavar="SCENE", help="a Mitsuba XML file")
+    one_scene.add_argument(
+        "scene", type=file_path, metavar="SCENE", help="a Mitsuba XML file"
+    )
     one_scene.add_argument(
         "-s", "--sensor", type=int, default=0, help="number of the sensor, from 0"
     )

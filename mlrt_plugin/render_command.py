@@ -43,6 +43,12 @@ class Job:
         return f"{self.scene} (sensor {self.sensor})" if self.sensor else str(self.scene)
 
 
+def file_path(text: str) -> Path:
+    if not text:
+        raise argparse.ArgumentTypeError("the name of the file is empty")
+    return Path(text)
+
+
 def resolution(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,6})x(\d{1,6})", text)
     if not match or "0" in (match[1].lstrip("0") or "0", match[2].lstrip("0") or "0"):
@@ -74,7 +80,7 @@ def sensor_numbers(text: str) -> tuple[int, ...] | None:
 
 def add_render_options(render: argparse.ArgumentParser) -> None:
     render.add_argument(
-        "scenes", type=Path, nargs="+", metavar="SCENE", help="a Mitsuba XML file"
+        "scenes", type=file_path, nargs="+", metavar="SCENE", help="a Mitsuba XML file"
     )
     render.add_argument(
         "-s",
@@ -87,7 +93,7 @@ def add_render_options(render: argparse.ArgumentParser) -> None:
     render.add_argument(
         "-o",
         "--output",
-        type=Path,
+        type=file_path,
         help="image to write, .exr or .png (default: beside the scene, .exr); with several "
         "scenes the folder for their images",
     )
@@ -138,8 +144,9 @@ def jobs_of(arguments: argparse.Namespace) -> list[Job]:
     for scene, sensors in chosen:
         for sensor in sensors:
             several_sensors = len(sensors) > 1
-            name = f"{scene.stem}-{sensor}.exr" if several_sensors else f"{scene.stem}.exr"
-            output = scene.with_name(name)
+            stem = scene.stem or "scene"  # a folder that will be complained of
+            name = f"{stem}-{sensor}.exr" if several_sensors else f"{stem}.exr"
+            output = scene.parent / name
             if several and arguments.output is not None:
                 output = arguments.output / name
             elif arguments.output is not None:
@@ -152,7 +159,7 @@ def jobs_of(arguments: argparse.Namespace) -> list[Job]:
         )
     by_output: dict[Path, Job] = {}
     for job in jobs:
-        other = by_output.setdefault(job.output.resolve(), job)
+        other = by_output.setdefault(Path(os.path.realpath(job.output)), job)
         if other is not job:
             raise OutputError(
                 f"{other} and {job} would both be written to '{job.output}': render them "

@@ -22,7 +22,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import secrets
 import stat
 import struct
 import zlib
@@ -35,6 +34,8 @@ from typing import Any, BinaryIO, NamedTuple
 import drjit as dr
 import numpy as np
 import numpy.typing as npt
+
+from mlrt_files import replacing
 
 from ._dispatch import core
 from .errors import TreeFileError
@@ -166,15 +167,10 @@ def new_file(path: Path) -> Iterator[BinaryIO]:
     Others see the old file or the new one, however many write at once. If anything fails,
     nothing is left.
     """
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}.tmp")
-    try:
-        with temporary.open("xb") as file:
-            yield file
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path, ".tmp") as temporary, temporary.open("xb") as file:
+        yield file
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def little_endian_chunks(words: npt.NDArray[np.uint32]) -> Iterator[memoryview]:

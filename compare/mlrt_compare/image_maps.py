@@ -11,6 +11,8 @@ from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image as Pillow
 
+from mlrt_files import put_in_place
+
 from .image_pair import ImagePair
 
 DECADES = 6
@@ -31,7 +33,7 @@ def write_maps(pairs: Sequence[ImagePair], folder: Path) -> list[Path]:
                 name = f"{pair.image.path.stem}-{kind}.png"
                 Pillow.fromarray(picture).save(Path(temporary) / name)
                 names.append(name)
-        return [(Path(temporary) / name).replace(folder / name) for name in names]
+        return [put_in_place(Path(temporary) / name, folder / name) for name in names]
 
 
 def maps_of(pair: ImagePair) -> dict[str, Rgb8]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from mlrt_plugin.hybrid.mitsuba_log import captured_log
 
+from .interrupts import interruptible
 from .mitsuba_scene import load_mitsuba_scene
 from .settings import Settings
 
@@ -66,7 +67,8 @@ class MitsubaRenderer:
         dr.sync_thread()
         # The history costs time of its own, so only the first frame, which compiles, has
         # it.
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, self._frames == 0):
+        history = dr.scoped_set_flag(dr.JitFlag.KernelHistory, self._frames == 0)
+        with interruptible(), history:
             start = time.perf_counter()
             self._tensor = mi.render(
                 self._loaded.scene,

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+from mlrt_files import is_special, obstacle, replacing
+
 from .settings import Settings
 
 PASSED, WARNED, FAILED, COULD_NOT_RUN, INTERRUPTED = 0, 1, 2, 4, 130
@@ -214,13 +216,8 @@ def check_output_folder(folder: Path) -> None:
 
 def check_json(path: Path | None) -> None:
     """Raises CannotRun for a file that could not be written after all the work."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise CannotRun(f"the file {path} to write figures to is a folder")
-    if not path.absolute().parent.is_dir():
-        raise CannotRun(f"there is no folder {path.parent} to write {path} to")
-    check_permission(path.absolute().parent)
+    if path is not None and (found := obstacle(path)):
+        raise CannotRun(f"{path} cannot be written: {found}")
 
 
 def check_permission(folder: Path) -> None:
@@ -231,28 +228,31 @@ def check_permission(folder: Path) -> None:
         )
 
 
-def write_json(path: Path | None, figures: Any) -> None:
+def write_json(path: Path | None, figures: Any, *, more_to_come: bool = False) -> None:
     """Writes figures, all of them or no file; a number that is not finite becomes null.
 
-    Raises CannotRun if that is not possible.
+    more_to_come: as `write_text` has it. Raises CannotRun if that is not possible.
     """
     if path is not None:
         text = json.dumps(without_nonfinite(figures), indent=2, allow_nan=False)
-        write_text(path, text + "\n")
+        write_text(path, text + "\n", more_to_come=more_to_come)
 
 
-def write_text(path: Path | None, text: str) -> None:
-    """Writes a text, all of it or no file. Raises CannotRun if that is not possible."""
+def write_text(path: Path | None, text: str, *, more_to_come: bool = False) -> None:
+    """Writes a text, all of it or no file.
+
+    more_to_come: that a longer one will take its place. A pipe, where that is not possible,
+    gets the last one only. Raises CannotRun if a text cannot be written.
+    """
     if path is None:
         return
-    temporary = path.with_name(f".{path.name}.unfinished")
     try:
-        temporary.write_text(text)
-        temporary.replace(path)
+        if more_to_come and is_special(path):
+            return
+        with replacing(path) as temporary:
+            temporary.write_text(text)
     except OSError as error:
         raise CannotRun(f"{path} cannot be written: {error.strerror}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def without_nonfinite(figures: Any) -> Any:

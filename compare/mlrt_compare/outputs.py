@@ -7,6 +7,7 @@ from pathlib import Path
 
 from PIL import Image as Pillow
 
+from mlrt_files import put_in_place
 from mlrt_plugin.image_files import write_image
 
 from .report import side_by_side
@@ -41,4 +42,4 @@ def write_outputs(
         if page is not None:
             names.append(f"{stem}-report.html")
             (unfinished / names[-1]).write_text(page, encoding="utf-8")
-        return [(unfinished / name).replace(folder / name) for name in names]
+        return [put_in_place(unfinished / name, folder / name) for name in names]

@@ -9,6 +9,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from mlrt_files import replacing
+
 from .bench.options import counts, names
 from .options import (
     FAILED,
@@ -143,8 +145,6 @@ def read_figures(folder: Path) -> dict[str, Any]:
 
 def write_pages(folder: Path, figures: dict[str, Any]) -> list[Path]:
     """Writes what is drawn from the figures, and prints the tables; returns the paths."""
-    from mlrt_plugin.image_files import replacing
-
     from .paper.plots import plots
     from .paper.text import markdown
 

@@ -49,6 +49,14 @@ def run(arguments: Sequence[str]) -> int:
 
     base = common_folder(scenes)
     rows: list[Row] = []
+
+    def write(more_to_come: bool) -> None:
+        options_told = [w for w in arguments if Path(w) not in options.scenes]
+        figures = {"options": options_told, "machine": machine_of_comparison()}
+        told = told_from({**figures, "scenes": rows}, base)
+        write_json(options.json, told, more_to_come=more_to_come)
+        write_text(options.table, table(rows), more_to_come=more_to_come)
+
     code = PASSED
     for scene, name in zip(scenes, short_names(scenes), strict=True):
         on_paths, choice = paths_of(settings_of(options, scene, options.spp))
@@ -70,10 +78,8 @@ def run(arguments: Sequence[str]) -> int:
             tell(row)
             if row["code"] != COULD_NOT_RUN or scene in options.scenes:
                 code = max(code, row["code"])
-            options_told = [w for w in arguments if Path(w) not in options.scenes]
-            figures = {"options": options_told, "machine": machine_of_comparison()}
-            write_json(options.json, told_from({**figures, "scenes": rows}, base))
-            write_text(options.table, table(rows))
+            write(more_to_come=True)
+    write(more_to_come=False)
     return code
 
 

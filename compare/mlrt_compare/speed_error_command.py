@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from mlrt_files import put_in_place
+
 from . import llvm
 from .options import (
     FAILED,
@@ -89,7 +91,7 @@ def write_all(
             write_json(unfinished[0], figures)
             unfinished[1].write_text(text)
             unfinished[2].write_bytes(picture)
-            return [path.replace(folder / path.name) for path in unfinished]
+            return [put_in_place(path, folder / path.name) for path in unfinished]
     except OSError as error:
         raise CannotRun(f"{folder} cannot be written to: {error.strerror}") from error
 

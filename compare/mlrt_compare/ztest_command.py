@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mlrt_files import put_in_place
+
 from .options import (
     COULD_NOT_RUN,
     FAILED,
@@ -156,9 +158,10 @@ def judge_scenes(options: argparse.Namespace) -> list[Judged]:
         except (MlrtError, CannotRun) as error:
             print(f"{PROGRAM}: {error}", file=sys.stderr)
             found.append(Judged(str(scene), error=str(error)))
+        more_to_come = scene is not scenes[-1]
         rows = told_from([one.as_dict() for one in found], common_folder(scenes))
-        write_json(options.json, rows)
-        write_text(options.table, table(rows))
+        write_json(options.json, rows, more_to_come=more_to_come)
+        write_text(options.table, table(rows), more_to_come=more_to_come)
     return found
 
 
@@ -301,7 +304,7 @@ def write_p_maps(judged: Sequence[Judged], folder: Path) -> None:
                 Pillow.fromarray(picture).save(path)
                 unfinished.append(path)
         for path in unfinished:
-            print(f"wrote {path.replace(folder / path.name)}")
+            print(f"wrote {put_in_place(path, folder / path.name)}")
 
 
 def ztest_parser() -> argparse.ArgumentParser:

@@ -55,8 +55,13 @@ public:
         counters_.rays += uint64_t(std::popcount(traced));
         counters_.packets += traced != 0;
         for_each_lane(extreme & lanes, [&](uint32_t lane) { trace_extreme(first + lane); });
-        if (active != 0)
-            active &= ~occluder_.stop(tree_, packet, active, first, output_, counters_);
+        if (active != 0) {
+            RayCost cost(rays_, counters_);
+            const LaneBits stopped =
+                occluder_.stop(tree_, packet, active, first, output_, counters_);
+            cost.add_to_lanes(first, active);
+            active &= ~stopped;
+        }
         if constexpr (std::is_same_v<Origin, CommonOrigin>)
             active &= ~add_packet(packet, active, first);
         if (active == 0)

@@ -8,6 +8,7 @@ import mitsuba as mi
 import numpy as np
 import OpenEXR
 import pytest
+from pipes_read import reader_of
 
 from mlrt_plugin import OutputError
 from mlrt_plugin.image_files import check_output, write_image
@@ -66,7 +67,7 @@ def test_png_is_srgb(tmp_path: Path) -> None:
     [
         ("image.jpg", (), "no known format"),
         ("image", (), "no known format"),
-        ("absent/image.exr", (), "absent' does not exist"),
+        ("absent/image.exr", (), "there is no folder .*absent: create"),
         ("image.png", ("depth",), "cannot hold AOVs"),
         ("folder.exr", (), "is a folder"),
     ],
@@ -77,6 +78,17 @@ def test_refused_before_work(
     (tmp_path / "folder.exr").mkdir()
     with pytest.raises(OutputError, match=expected):
         check_output(tmp_path / name, aovs)
+
+
+def test_a_pipe_gets_the_image(tmp_path: Path) -> None:
+    for name in ("image.exr", "image.png"):
+        file, pipe = tmp_path / name, tmp_path / f"pipe-{name}"
+        write_image(file, IMAGE)
+        with reader_of(pipe) as told:
+            check_output(pipe)
+            write_image(pipe, IMAGE)
+            assert told() == file.read_bytes()
+        assert pipe.is_fifo()
 
 
 @pytest.mark.parametrize("error", [RuntimeError("disk\nfull"), KeyboardInterrupt()])

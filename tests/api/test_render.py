@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
+import repository
 import scene_files
 
 import mlrt_plugin
@@ -295,39 +297,45 @@ def many_blocks(count: int) -> str:
 
 # Large enough for beams of as many rays as there can be, which meet too many triangles.
 LARGE_SENSOR = scene_files.SENSOR.replace("16", "256").replace("12", "256")
+TRAVERSALS = ("adaptive", "wide", "beam_leaf", "packet", "interval", "single")
 
 
-@pytest.mark.parametrize(
-    ("parts", "spp"),
-    [
-        ({}, 2),
-        ({"shapes": scene_files.FLOOR + many_blocks(49), "sensor": LARGE_SENSOR}, 1),
-    ],
-    ids=["one face", "many faces"],
-)
-def test_cost_tells_where_the_work_is(
-    scene_file: SceneFile, parts: dict[str, str], spp: int
-) -> None:
-    """What counters count in all is what the picture holds, and none of it moves light."""
-    path = scene_file(**parts)
-    for options in ({}, {"traversal": "packet"}, {"traversal": "single"}):
-        plain = render(path, spp=spp, **options)
-        result = render(path, spp=spp, aovs=("cost",), **options)
-        assert np.array_equal(result.image, plain.image)
-        if parts and not options:
-            assert result.counters["primary_fallbacks"] > 0, "the case that this is about"
-        work = sum(
-            result.counters[ray + name]
-            for ray in ("primary_", "shadow_")
-            for name in (
-                "entry_steps",
-                "traversal_steps",
-                "beam_steps",
-                "triangle_tests",
-                "beam_triangles",
-            )
+def check_cost(path: Path, traversal: str, spp: int, **options: Any) -> dict[str, Any]:
+    """What counters count in all is what the picture holds, and none of it moves light.
+    Returns the counters."""
+    options |= {"traversal": traversal, "spp": spp}
+    plain = render(path, **options)
+    result = render(path, aovs=("cost",), **options)
+    assert np.array_equal(result.image, plain.image)
+    work = sum(
+        result.counters[ray + name]
+        for ray in ("primary_", "shadow_")
+        for name in (
+            "entry_steps",
+            "traversal_steps",
+            "beam_steps",
+            "triangle_tests",
+            "beam_triangles",
         )
-        cost = result.aovs["cost"]
-        assert cost.shape == result.image.shape[:2]
-        assert (cost >= 0).all() and cost.any()
-        assert cost.sum(dtype=np.float64) * spp == pytest.approx(work, rel=1e-4)
+    )
+    cost = result.aovs["cost"]
+    assert cost.shape == result.image.shape[:2]
+    assert (cost >= 0).all() and cost.any()
+    assert cost.sum(dtype=np.float64) * spp == pytest.approx(work, rel=1e-6)
+    return result.counters
+
+
+@pytest.mark.parametrize("traversal", TRAVERSALS)
+def test_cost_tells_where_the_work_is(scene_file: SceneFile, traversal: str) -> None:
+    check_cost(scene_file(), traversal, 2)
+    blocks = scene_file(shapes=scene_files.FLOOR + many_blocks(49), sensor=LARGE_SENSOR)
+    counters = check_cost(blocks, traversal, 1)
+    if traversal == "adaptive":
+        assert counters["primary_fallbacks"] > 0, "the case that this is about"
+
+
+@pytest.mark.parametrize("traversal", TRAVERSALS)
+def test_cost_of_shadows_of_an_area_light(traversal: str) -> None:
+    """Rays that stop at the triangle where one did before take a test as well."""
+    path = repository.ROOT / "scenes" / "cornell-box" / "cornell-box.xml"
+    check_cost(path, traversal, 4, resolution=(64, 64))

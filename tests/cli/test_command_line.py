@@ -50,6 +50,10 @@ USAGE = {
     "aov": (["render", "scene.xml", "--aov", "depth,albedo"], "'albedo' does not exist"),
     "spp": (["render", "scene.xml", "--spp", "many"], "many"),
     "sensor": (["info", "scene.xml", "-s", "left"], "left"),
+    "empty name": (["render", ""], "SCENE: the name of the file is empty"),
+    "one empty name": (["render", "scene.xml", ""], "the name of the file is empty"),
+    "empty output": (["render", "scene.xml", "-o", ""], "the name of the file is empty"),
+    "nothing to tell of": (["info", ""], "the name of the file is empty"),
 }
 
 
@@ -67,7 +71,7 @@ ERRORS = {
     "seed": (["--seed", "-1"], "seed = -1"),
     "sensor": (["-s", "3"], "no sensor 3: it has 1"),
     "unused definition": (["-D", "res=3"], "$res=3"),
-    "output folder": (["-o", "absent/image.exr"], "absent' does not exist"),
+    "output folder": (["-o", "absent/image.exr"], "there is no folder absent: create it"),
     "output format": (["-o", "image.bmp"], "image.bmp"),
     "AOVs in a PNG": (["-o", "image.png", "--aov", "depth"], "cannot hold AOVs"),
 }
@@ -89,6 +93,18 @@ def test_missing_scene(command: str, capsys: pytest.CaptureFixture[str]) -> None
     assert line == "mlrt: error: scene file 'absent.xml' does not exist: check its path"
 
 
+@pytest.mark.parametrize("folder", [".", ".."])
+def test_a_folder_is_no_scene(
+    folder: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    line = failure(["render", folder], 1, capsys)
+    assert line == f"mlrt: error: scene '{folder}' is a folder: name the XML file in it"
+
+
 def test_unsupported_feature(
     scene_file: SceneFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -105,7 +121,7 @@ def test_folder_that_cannot_be_written(
     folder = tmp_path / "locked"
     folder.mkdir(mode=0o500)
     argv = ["render", str(scene_file()), "-o", str(folder / "image.exr")]
-    assert "not writable" in failure(argv, 1, capsys)
+    assert "no permission to write to the folder" in failure(argv, 1, capsys)
 
 
 def test_traceback_on_request(

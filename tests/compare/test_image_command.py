@@ -12,7 +12,9 @@ import exr_images
 import numpy as np
 import pytest
 from mlrt_compare.cli import main
+from mlrt_compare.options import write_text
 from PIL import Image as Pillow
+from pipes_read import reader_of
 
 SEED = 20_260_808
 
@@ -201,6 +203,38 @@ def test_bad_input_is_one_sentence(
         lines = captured.err.splitlines()
         assert len(lines) == 1 and lines[0].startswith("mlrt-compare: "), (name, lines)
         assert said in lines[0], (name, lines)
+
+
+def test_figures_go_into_a_pipe_that_stays_one(tmp_path: Path, reference: Path) -> None:
+    file, pipe = tmp_path / "figures.json", tmp_path / "pipe.json"
+    assert run(reference, reference, "--json", file) == 0
+    with reader_of(pipe) as told:
+        assert run(reference, reference, "--json", pipe) == 0
+        assert told() == file.read_bytes()
+    assert pipe.is_fifo()
+
+
+def test_figures_and_maps_go_where_links_point(tmp_path: Path, reference: Path) -> None:
+    kept, output = tmp_path / "kept", tmp_path / "output"
+    kept.mkdir()
+    output.mkdir()
+    links = [output / "figures.json", output / "reference-difference.png"]
+    for link in links:
+        link.symlink_to(kept / link.name)
+    assert run(reference, reference, "-o", output, "--json", links[0]) == 0
+    assert all(link.is_symlink() for link in links)
+    assert sorted(kept.iterdir()) == sorted(kept / link.name for link in links)
+    assert json.loads(links[0].read_text())
+
+
+def test_of_texts_that_grow_a_pipe_gets_the_last(tmp_path: Path) -> None:
+    file, pipe = tmp_path / "file", tmp_path / "pipe"
+    with reader_of(pipe) as told:
+        for number in range(3):
+            for path in (file, pipe):
+                write_text(path, f"{number}", more_to_come=number < 2)
+            assert file.read_text() == f"{number}"
+        assert told() == b"2"
 
 
 def test_a_folder_without_permission_is_told_of_before_the_work(

@@ -30,6 +30,37 @@ MlrtRenderer.frame = frame
 sys.exit(cli.main(sys.argv[1:]))
 """
 
+# It comes while Mitsuba's own code in Python runs, called by Dr.Jit.
+INTERRUPTED_OPERATION = """
+import sys
+from mlrt_compare import cli, llvm
+llvm.activate()
+import mitsuba as mi
+mi.set_variant("llvm_ad_rgb")
+from mitsuba.python import util
+def interrupted(*arguments):
+    raise KeyboardInterrupt
+util._RenderOp.eval = interrupted
+sys.exit(cli.main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("command", ["scene", "speed-error", "parity"])
+def test_an_interrupt_that_drjit_made_an_error_of(tmp_path: Path, command: str) -> None:
+    more = ("--cache", tmp_path) if command == "speed-error" else ()
+    arguments = (command, SCENE, "--resolution", "16x16", *more)
+    child = subprocess.run(
+        [sys.executable, "-P", "-c", INTERRUPTED_OPERATION, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        cwd=tmp_path,
+    )
+    assert child.returncode == 130, child.stdout + child.stderr
+    assert child.stderr.splitlines()[-1] == "mlrt-compare: interrupted"
+    assert "Traceback" not in child.stderr
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
 
 @pytest.mark.parametrize(
     "command",

@@ -28,6 +28,9 @@ PATHS = [
     {"traversal": "packet", "minimum_tile": 8, "culling": "frustum_planes"},
 ]
 
+# These look for the wide tree, which is there once it is asked for or enough rays came.
+WIDE_PATHS = [{"traversal": name} for name in ("beam_leaf", "adaptive", "wide")]
+
 OWN = ["cornell-box/cornell-box.xml", "office/office.xml"]
 THIRD_PARTY = [
     "conference/conference.xml",
@@ -68,6 +71,22 @@ def assert_same(hits: Hits, reference: Hits, what: object) -> None:
         )
 
 
+def shadow_rays(
+    points: np.ndarray, light: np.ndarray, extent: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray, float, float]]:
+    """From a light to points (a common origin), from a lamp around it (an origin each, and
+    little between), on from the points (none), and from them to a sun (one direction)."""
+    rng = np.random.default_rng(8)
+    lamp = (light + rng.random(points.shape) * 0.02 * extent).astype(np.float32)
+    sun = np.tile(np.float32([0.3, 0.8, 0.2]), (len(points), 1))
+    return [
+        (np.broadcast_to(light, points.shape), points - light, 1e-3, 0.999),
+        (lamp, points - lamp, 1e-3, 0.999),
+        (points, light - points, 1e-3, 0.999),
+        (points, sun, 1e-3, np.inf),
+    ]
+
+
 def check(path: Path, full: bool) -> None:
     scene = import_scene(path)
     tree = KdTree(scene.vertices, scene.faces)
@@ -91,15 +110,28 @@ def check(path: Path, full: bool) -> None:
     )
     assert_same(brute, Hits(*(values[some] for values in reference)), "brute force")
 
-    # From a light to the hits (a common origin, any direction) and on from the hits (none).
     points = origin[hit] + reference.t[hit, None] * direction[hit]
     light = np.float32(scene.camera.origin) + np.float32([0.1, 0.2, 0.3])
-    segments = np.broadcast_to(light, points.shape), (points - light).astype(np.float32)
-    for start, along in (segments, (points, (light - points).astype(np.float32))):
-        expected = tree.closest_hit(start, along, 1e-3, 0.999, **PATHS[0]).primitive >= 0
-        for options in PATHS:
-            occluded = tree.any_hit(start, along, 1e-3, 0.999, **options)
-            assert np.array_equal(occluded, expected), options
+    shadows = shadow_rays(points, light, np.ptp(scene.vertices, axis=0))
+    expected = [tree.closest_hit(*rays, **PATHS[0]).primitive >= 0 for rays in shadows]
+    some = rng.choice(len(points), 5_000 if full else 100, replace=False)
+    for (start, along, *interval), occluded in zip(shadows, expected, strict=True):
+        brute = tree.any_hit(start[some], along[some], *interval, traversal="brute_force")
+        assert np.array_equal(brute, occluded[some]), "brute force"
+
+    def check_shadows(options: dict[str, object], what: str = "") -> None:
+        for rays, occluded in zip(shadows, expected, strict=True):
+            assert np.array_equal(tree.any_hit(*rays, **options), occluded), (options, what)
+
+    for options in PATHS:
+        check_shadows(options)
+    for widened in ("as it comes", "widened"):
+        if widened == "widened":
+            tree.widen()
+        for options in WIDE_PATHS:
+            found = tree.closest_hit(origin, direction, near, far, **options)
+            assert_same(found, reference, (options, widened))
+            check_shadows(options, widened)
 
 
 @pytest.mark.parametrize("name", OWN)

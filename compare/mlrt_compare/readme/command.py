@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from mlrt_plugin.image_files import replacing
+from mlrt_files import replacing
 
 from ..bench.checkout import find_checkout
 from ..bench.errors import BenchError
