@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import OpenEXR
 
-from mlrt_files import obstacle
-from mlrt_files import replacing as replacing  # the benchmarks look here for it
+from mlrt_files import obstacle, replacing
 
 from .errors import OutputError
 

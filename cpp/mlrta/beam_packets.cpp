@@ -38,11 +38,8 @@ void BeamPackets::set_axes(Vec3f d) {
     const int k = largest_axis(d);
     axes = {(k + 1) % 3, (k + 2) % 3, k};
     side = d[k] > 0 ? 1.0f : -1.0f;
-}
-
-void BeamPackets::set_slopes(Vec3f d) {
-    slope_u = d[axes[0]] / std::abs(d[axes[2]]);
-    slope_v = d[axes[1]] / std::abs(d[axes[2]]);
+    slope_u = d[axes[0]] / std::abs(d[k]);
+    slope_v = d[axes[1]] / std::abs(d[k]);
 }
 
 // A register at a time, as all of its values would not fit into them else.
@@ -336,14 +333,9 @@ void BeamPackets::load(const RayGroup &rays, uint32_t first, uint32_t ray_count,
     origin = rays.common_origin;
     count = 0;
     any_active = any_stray = false;
-    if (!is_finite(origin))
-        return;
-    const std::optional<uint32_t> middle = choose_axis(rays, first, ray_count);
-    if (!middle)
+    if (!is_finite(origin) || !choose_axis(rays, first, ray_count))
         return;
     covered = unloaded = {};
-    set_slopes({rays.direction[0][*middle], rays.direction[1][*middle],
-                rays.direction[2][*middle]});
     std::optional<uint32_t> first_active;
     FarthestEnds farthest;
     for (uint32_t i = first; i < first + ray_count; i += PACKET_WIDTH) {

@@ -3,10 +3,10 @@
 //
 // Common origin: with k the main axis and i, j the two that follow it cyclically, the
 // direction of a ray is |d_k| (u + slope_u, v + slope_v, side) in the order (i, j, k): u
-// and v are its slopes d_i / |d_k| and d_j / |d_k| relative to those of a ray of the beam,
-// so that they keep the digits in which rays differ; side is the sign that all d_k share.
-// What is linear in the direction is |d_k| times something linear in (u, v), and so is one
-// over the depth z = t |d_k| at which a plane is met.
+// and v are its slopes d_i / |d_k| and d_j / |d_k| relative to those in the middle of the
+// beam, so that they keep the digits in which rays differ; side is the sign that all d_k
+// share. What is linear in the direction is |d_k| times something linear in (u, v), and so
+// is one over the depth z = t |d_k| at which a plane is met.
 //
 // Common direction, but for rounding: with x relative to a point of the beam, u = x_i -
 // slope_u z and v = x_j - slope_v z with z = side x_k are the same along a ray, and -z is
@@ -88,8 +88,7 @@ struct BeamPackets {
     float slope_u, slope_v;
     SlopeRectangle rectangle; // holds (u, v) of all active rays
     float spread;             // the greatest |u| + |v| in it and in the boxes of runs
-    // Bounds of all slopes, which are relative to nothing; of parallel rays those of (u,
-    // v).
+    // Bounds of slopes relative to nothing; of parallel rays those of (u, v).
     float slope_lo[2], slope_hi[2];
 
     // Of parallel rays: how far slopes may deviate from the common ones, the greatest
@@ -194,8 +193,8 @@ private:
         return select(from_bits<FloatPacket>(lanes), values, FloatPacket(other));
     }
 
+    // By the way that a ray goes: the slopes of others are relative to its own.
     void set_axes(Vec3f direction);
-    void set_slopes(Vec3f direction);
     // Returns the ray that it was chosen by, if any is active.
     std::optional<uint32_t> choose_axis(const RayGroup &rays, uint32_t first,
                                         uint32_t ray_count);

@@ -122,11 +122,7 @@ void BeamPackets::load_around(uint32_t middle, const RayGroup &rays, uint32_t fi
     count = 0;
     any_active = any_stray = false;
     origin = vector_of(rays.origin, middle);
-    const Vec3f direction = vector_of(rays.direction, middle);
-    set_axes(direction);
-    const auto [i, j, k] = axes;
-    slope_u = direction[i] / std::abs(direction[k]);
-    slope_v = direction[j] / std::abs(direction[k]);
+    set_axes(vector_of(rays.direction, middle));
     FloatPacket most_deviation = 0.0f, reach = 0.0f;
     for (uint32_t at = first; at < first + ray_count; at += PACKET_WIDTH) {
         const uint32_t n = count++;

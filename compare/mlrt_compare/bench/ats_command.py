@@ -5,14 +5,12 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mlrt_plugin.image_files import replacing
 from mlrt_plugin.threads import thread_count
 
 from . import ats_table
 from .ats import baselines
 from .checkout import find_checkout
-from .errors import BenchError
-from .figures import measure_scenes, new_figures, show
+from .figures import measure_scenes, new_figures, show, write_text
 from .machine import machine_record
 from .native import load_native
 from .options import default_cache
@@ -62,12 +60,5 @@ def run(options: argparse.Namespace) -> bool:
     )
     summary = ats_table.summary_lines(figures["scenes"])
     show(summary)
-    if options.markdown is not None:
-        try:
-            with replacing(options.markdown) as temporary:
-                temporary.write_text(ats_table.markdown(figures), encoding="utf-8")
-        except OSError as error:
-            raise BenchError(
-                f"{options.markdown} cannot be written: {error.strerror}"
-            ) from error
+    write_text(options.markdown, ats_table.markdown(figures))
     return True

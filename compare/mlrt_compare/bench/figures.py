@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from mlrt_plugin.image_files import replacing
+from mlrt_files import replacing
 
 from .errors import BenchError
 
@@ -74,10 +74,15 @@ def show(lines: list[str]) -> None:
 
 
 def write_json(path: Path | None, figures: dict[str, Any]) -> None:
+    write_text(path, json.dumps(figures, indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path | None, text: str) -> None:
+    """Writes a text, all of it or no file. Raises BenchError if that is not possible."""
     if path is None:
         return
     try:
         with replacing(path) as temporary:
-            temporary.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n")
+            temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise BenchError(f"{path} cannot be written: {error.strerror}") from error

@@ -5,11 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mlrt_plugin.image_files import replacing
 from mlrt_plugin.threads import thread_count
 
 from .checkout import find_checkout
-from .figures import new_figures, show, write_json
+from .figures import new_figures, show, write_json, write_text
 from .kernel_shadows import (
     PLACEMENTS,
     RESOLUTION,
@@ -93,9 +92,7 @@ def run(options: argparse.Namespace) -> bool:
             show(["", frame_line(threads, frames)])
     write_json(options.json, figures)
     show(["", *summary_lines(figures)])
-    if options.markdown is not None:
-        with replacing(options.markdown) as temporary:
-            temporary.write_text(markdown(figures), encoding="utf-8")
+    write_text(options.markdown, markdown(figures))
     if options.plot is not None:
         from .kernels_plot import write_plot
 

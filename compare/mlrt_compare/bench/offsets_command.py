@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image as Pillow
 
-from mlrt_plugin.image_files import replacing
+from mlrt_files import replacing
 from mlrt_plugin.options import SHADOW_OFFSETS
 from mlrt_plugin.render import PreparedScene, prepare
 

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from mlrt_files import obstacle
+
 from .errors import BenchError
 
 PLOTS = (".png", ".svg", ".pdf")
@@ -118,11 +120,8 @@ def add_sample_counts(command: argparse.ArgumentParser) -> None:
 
 def check_json(path: Path | None) -> None:
     """Raises BenchError for a file that could not be written after all the work."""
-    if path is None:
-        return
-    if path.is_dir():
-        raise BenchError(f"the file {path} to write figures to is a folder")
-    check_folder_of(path)
+    if path is not None and (found := obstacle(path)):
+        raise BenchError(f"{path} cannot be written: {found}")
 
 
 def check_cache(path: Path | None) -> None:

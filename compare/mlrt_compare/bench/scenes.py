@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from mlrt_files import replacing
 from mlrt_plugin.errors import MlrtError
-from mlrt_plugin.image_files import replacing
 from mlrt_plugin.scene_arrays import Camera, SceneArrays
 from mlrt_plugin.scene_import import import_scene
 from mlrt_plugin.shape_arrays import NONE
